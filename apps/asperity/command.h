@@ -1,0 +1,52 @@
+#pragma once
+// What the commands of the program share. Each command has one file: add_NAME declares its options and says what to do.
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "asperity/core/progress.h"
+#include "asperity/core/result.h"
+
+namespace asperity::program {
+
+using Json = nlohmann::ordered_json;
+
+/// Exit codes: the same for every command.
+inline constexpr int exit_success = 0;
+inline constexpr int exit_check_failed = 1;  ///< it ran, and what it checked does not hold
+inline constexpr int exit_bad_input = 2;     ///< input or usage
+
+/// What every command has.
+struct Console {
+  bool json = false;           ///< machine-readable answer on standard output
+  bool show_progress = false;  ///< on standard error even when that is no terminal
+  std::string command_line;    ///< as it was called
+
+  /// Progress on standard error, once something has taken longer than a moment; empty when nobody looks. [main]
+  [[nodiscard]] Progress progress() const;
+  /// "note: ..." on standard error. [main]
+  void note(const std::string& text) const;
+  /// One JSON document on standard output. [main]
+  void print(const Json& document) const;
+};
+
+/// What a command does once its options are read: its exit code, or why it could not.
+using Action = std::function<Result<int>()>;
+
+/// "asperity 0.1.0"
+std::string program_name();
+
+CLI::App* add_touch(CLI::App& app, Console& console, Action& action);
+CLI::App* add_compare(CLI::App& app, Console& console, Action& action);
+CLI::App* add_replay(CLI::App& app, Console& console, Action& action);
+CLI::App* add_inspect(CLI::App& app, Console& console, Action& action);
+CLI::App* add_scenes(CLI::App& app, Console& console, Action& action);
+CLI::App* add_bench(CLI::App& app, Console& console, Action& action);
+CLI::App* add_schema(CLI::App& app, Console& console, Action& action);
+
+/// Adds --json and --progress, which every command takes.
+void add_console_options(CLI::App& command, Console& console, bool with_json = true);
+
+}  // namespace asperity::program

@@ -1,0 +1,71 @@
+#pragma once
+// What goes into `step` and what comes out of it.
+
+#include <cstdint>
+
+#include "asperity/core/frames.h"
+#include "asperity/core/units.h"
+
+namespace asperity {
+
+/// Where the probe is, as the device side reports it. World frame, SI.
+struct ProbeSample {
+  Pose pose;
+  Twist twist;  ///< estimated by the device side; its error is the estimator's to state
+  std::uint32_t buttons = 0;
+  Seconds time{0.0};  ///< since the start of the run
+};
+
+/// Status of one tick. Bits, because several can hold at once.
+enum class TickFlag : std::uint32_t {
+  contact = 1u << 0,           ///< a surface pushes on the probe
+  not_converged = 1u << 1,     ///< the constraint solve used its whole budget; the proxy is feasible, not yet optimal
+  started_inside = 1u << 2,    ///< the probe began inside an object and has not left it yet; force withheld
+  input_not_finite = 1u << 3,  ///< the probe sample held a NaN or an infinity; the last force was not continued
+  force_limited = 1u << 4,     ///< the safety stage clamped the magnitude
+  slew_limited = 1u << 5,      ///< the safety stage limited the change per second
+  output_not_finite = 1u << 6,  ///< the safety stage replaced a force that was not finite by zero
+  contacts_dropped = 1u << 7,   ///< more instances within reach than a probe can hold at once; the farther ones are not felt
+};
+
+/// A set of TickFlag.
+class Flags {
+ public:
+  constexpr void set(TickFlag flag, bool on = true) noexcept {
+    const auto bit = static_cast<std::uint32_t>(flag);
+    bits_ = on ? bits_ | bit : bits_ & ~bit;
+  }
+  [[nodiscard]] constexpr bool has(TickFlag flag) const noexcept {
+    return (bits_ & static_cast<std::uint32_t>(flag)) != 0;
+  }
+  [[nodiscard]] constexpr std::uint32_t bits() const noexcept { return bits_; }
+  static constexpr Flags from_bits(std::uint32_t bits) noexcept {
+    Flags flags;
+    flags.bits_ = bits;
+    return flags;
+  }
+
+ private:
+  std::uint32_t bits_ = 0;
+};
+
+/// What is touched, in brief. Fields that a law does not know are left at their defaults.
+struct ContactSummary {
+  std::uint32_t count = 0;             ///< constraints or patches that push
+  std::uint32_t instance = no_index;   ///< of the strongest one
+  std::uint32_t element = no_index;    ///< face, cell or patch of that instance
+  Vec3 point = Vec3::Zero();           ///< on the surface (m, world)
+  Vec3 normal = Vec3::Zero();          ///< unit, outward from what is touched (world); zero without contact
+  double penetration = 0.0;            ///< m, along `normal`
+  double height = 0.0;                 ///< relief height under the probe (m); 0 without a coat
+};
+
+/// What the hand should feel. World frame, SI.
+struct ForceSample {
+  Wrench wrench;
+  Vec3 proxy = Vec3::Zero();  ///< the probe's constrained twin (m); equals the probe's position in free space
+  ContactSummary contact;
+  Flags flags;
+};
+
+}  // namespace asperity

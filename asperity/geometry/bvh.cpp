@@ -1,0 +1,384 @@
+#include "asperity/geometry/bvh.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace asperity {
+
+namespace {
+
+constexpr std::uint32_t leaf_size = 8;
+constexpr int bin_count = 16;
+// Below this depth ranges are halved by position whatever the area: it bounds the traversal stack.
+constexpr int balanced_depth = 20;
+
+struct Primitive {
+  float lower[3];
+  float upper[3];
+  std::uint32_t face;
+  [[nodiscard]] float centre(int axis) const { return lower[axis] + upper[axis]; }
+};
+
+struct FloatBox {
+  float lower[3] = {1e30F, 1e30F, 1e30F};
+  float upper[3] = {-1e30F, -1e30F, -1e30F};
+  void include(const Primitive& p) {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis] = std::min(lower[axis], p.lower[axis]);
+      upper[axis] = std::max(upper[axis], p.upper[axis]);
+    }
+  }
+  void include(const FloatBox& b) {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis] = std::min(lower[axis], b.lower[axis]);
+      upper[axis] = std::max(upper[axis], b.upper[axis]);
+    }
+  }
+  [[nodiscard]] float area() const {
+    const float x = upper[0] - lower[0];
+    const float y = upper[1] - lower[1];
+    const float z = upper[2] - lower[2];
+    return x < 0.0F ? 0.0F : x * y + y * z + z * x;
+  }
+};
+
+struct Range {
+  std::uint32_t first;
+  std::uint32_t last;
+  FloatBox box;
+  [[nodiscard]] std::uint32_t size() const { return last - first; }
+};
+
+}  // namespace
+
+class Bvh::Builder {
+ public:
+  Builder(const TriangleMesh& mesh, Bvh& bvh) : mesh_(mesh), bvh_(bvh) {}
+
+  void run() {
+    const auto count = static_cast<std::uint32_t>(mesh_.triangles().size());
+    primitives_.resize(count);
+    Range all{0, count, {}};
+    for (std::uint32_t face = 0; face < count; ++face) {
+      primitives_[face] = primitive(face);
+      all.box.include(primitives_[face]);
+    }
+    bvh_.leaves_.reserve(count / 5 + 1);
+    bvh_.nodes_.reserve(count / 24 + 1);
+    build_node(all, 0);
+    bvh_.nodes_.shrink_to_fit();
+    bvh_.leaves_.shrink_to_fit();
+  }
+
+ private:
+  [[nodiscard]] Primitive primitive(std::uint32_t face) const {
+    Primitive p{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}, face};
+    for (const Vec3& corner : mesh_.corners(face)) {
+      float local[3];
+      bvh_.to_local(corner, local);
+      for (int axis = 0; axis < 3; ++axis) {
+        p.lower[axis] = std::min(p.lower[axis], local[axis]);
+        p.upper[axis] = std::max(p.upper[axis], local[axis]);
+      }
+    }
+    return p;
+  }
+
+  std::uint32_t build_node(const Range& range, int depth) {
+    Range children[8];
+    int count = 1;
+    children[0] = range;
+    while (count < 8) {
+      int widest = -1;
+      for (int i = 0; i < count; ++i) {
+        if (children[i].size() <= leaf_size) continue;
+        if (widest < 0 || children[i].box.area() > children[widest].box.area()) widest = i;
+      }
+      if (widest < 0) break;
+      split(children[widest], depth, children[widest], children[count]);
+      ++count;
+    }
+    const auto index = static_cast<std::uint32_t>(bvh_.nodes_.size());
+    bvh_.nodes_.emplace_back();
+    set_boxes(bvh_.nodes_[index], children, count);
+    for (int i = 0; i < count; ++i) {
+      const std::uint32_t child =
+          children[i].size() <= leaf_size ? build_leaf(children[i]) : build_node(children[i], depth + 1);
+      bvh_.nodes_[index].child[i] = child;
+    }
+    return index;
+  }
+
+  static void set_boxes(Node& node, const Range (&children)[8], int count) {
+    for (int i = 0; i < 8; ++i) {
+      node.child[i] = empty_child;
+      for (int axis = 0; axis < 3; ++axis) {
+        node.boxes.lower[axis][i] = i < count ? children[i].box.lower[axis] : 1e30F;
+        node.boxes.upper[axis][i] = i < count ? children[i].box.upper[axis] : -1e30F;
+      }
+    }
+  }
+
+  std::uint32_t build_leaf(const Range& range) {
+    Leaf leaf;
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      const bool used = i < range.size();
+      leaf.face[i] = used ? primitives_[range.first + i].face : no_index;
+      for (int axis = 0; axis < 3; ++axis) {
+        leaf.triangles.corner[axis][i] = 1e9F;
+        leaf.triangles.edge1[axis][i] = 0.0F;
+        leaf.triangles.edge2[axis][i] = 0.0F;
+      }
+      if (!used) continue;
+      const auto corners = mesh_.corners(leaf.face[i]);
+      for (int axis = 0; axis < 3; ++axis) {
+        leaf.triangles.corner[axis][i] = static_cast<float>((corners[0][axis] - bvh_.origin_[axis]) * bvh_.per_scale_);
+        leaf.triangles.edge1[axis][i] = static_cast<float>((corners[1][axis] - corners[0][axis]) * bvh_.per_scale_);
+        leaf.triangles.edge2[axis][i] = static_cast<float>((corners[2][axis] - corners[0][axis]) * bvh_.per_scale_);
+      }
+    }
+    bvh_.leaves_.push_back(leaf);
+    return static_cast<std::uint32_t>(bvh_.leaves_.size() - 1) | leaf_bit;
+  }
+
+  /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
+  void split(Range range, int depth, Range& left, Range& right) {
+    float low[3] = {1e30F, 1e30F, 1e30F};
+    float high[3] = {-1e30F, -1e30F, -1e30F};
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const float c = primitives_[i].centre(axis);
+        low[axis] = std::min(low[axis], c);
+        high[axis] = std::max(high[axis], c);
+      }
+    }
+    int axis = 0;
+    for (int other = 1; other < 3; ++other) {
+      if (high[other] - low[other] > high[axis] - low[axis]) axis = other;
+    }
+    std::uint32_t middle = range.first;
+    if (depth < balanced_depth && high[axis] - low[axis] > 1e-12F) {
+      middle = partition_by_area(range, axis, low[axis], high[axis]);
+    }
+    if (middle == range.first || middle == range.last) middle = halve(range, axis);
+    left = bounded(range.first, middle);
+    right = bounded(middle, range.last);
+  }
+
+  std::uint32_t partition_by_area(const Range& range, int axis, float low, float high) {
+    const float to_bin = static_cast<float>(bin_count) * 0.9999F / (high - low);
+    const auto bin_of = [&](const Primitive& p) { return static_cast<int>((p.centre(axis) - low) * to_bin); };
+    FloatBox boxes[bin_count];
+    std::uint32_t counts[bin_count] = {};
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      const int bin = bin_of(primitives_[i]);
+      boxes[bin].include(primitives_[i]);
+      ++counts[bin];
+    }
+    float right_cost[bin_count] = {};
+    FloatBox sweep;
+    std::uint32_t sum = 0;
+    for (int bin = bin_count - 1; bin > 0; --bin) {
+      sweep.include(boxes[bin]);
+      sum += counts[bin];
+      right_cost[bin] = sweep.area() * static_cast<float>(sum);
+    }
+    sweep = {};
+    sum = 0;
+    int best = -1;
+    float best_cost = 1e30F;
+    for (int bin = 0; bin + 1 < bin_count; ++bin) {
+      sweep.include(boxes[bin]);
+      sum += counts[bin];
+      const float cost = sweep.area() * static_cast<float>(sum) + right_cost[bin + 1];
+      if (sum != 0 && sum != range.size() && cost < best_cost) {
+        best_cost = cost;
+        best = bin;
+      }
+    }
+    if (best < 0) return range.first;
+    const auto first = primitives_.begin() + range.first;
+    const auto last = primitives_.begin() + range.last;
+    const auto middle = std::partition(first, last, [&](const Primitive& p) { return bin_of(p) <= best; });
+    return static_cast<std::uint32_t>(middle - primitives_.begin());
+  }
+
+  std::uint32_t halve(const Range& range, int axis) {
+    const std::uint32_t middle = range.first + range.size() / 2;
+    const auto begin = primitives_.begin();
+    std::nth_element(begin + range.first, begin + middle, begin + range.last,
+                     [axis](const Primitive& a, const Primitive& b) { return a.centre(axis) < b.centre(axis); });
+    return middle;
+  }
+
+  [[nodiscard]] Range bounded(std::uint32_t first, std::uint32_t last) const {
+    Range range{first, last, {}};
+    for (std::uint32_t i = first; i < last; ++i) range.box.include(primitives_[i]);
+    return range;
+  }
+
+  const TriangleMesh& mesh_;
+  Bvh& bvh_;
+  std::vector<Primitive> primitives_;
+};
+
+Bvh Bvh::build(const TriangleMesh& mesh, const BvhSettings& settings) {
+  Bvh bvh;
+  bvh.mesh_ = &mesh;
+  bvh.kernels_ = settings.plain_kernels ? &plain_kernels() : &best_kernels();
+  bvh.origin_ = mesh.bounds().centre();
+  bvh.scale_ = std::max(0.5 * mesh.bounds().diagonal(), std::numeric_limits<double>::min());
+  bvh.per_scale_ = 1.0 / bvh.scale_;
+  Builder(mesh, bvh).run();
+  return bvh;
+}
+
+ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
+  ClosestHit best;
+  if (nodes_.empty() || !(bound >= 0.0)) return best;
+  float local[3];
+  to_local(p, local);
+  const float error = rounding(local);
+  double best_squared = bound * bound;
+  float limit = std::isfinite(bound) ? static_cast<float>(bound / scale_) * 1.000001F + error : 1e15F;
+  Entry stack[stack_capacity];
+  int top = 0;
+  stack[top++] = {0.0F, 0};
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (entry.key > limit * limit) continue;
+    if ((entry.child & leaf_bit) != 0) {
+      const Leaf& leaf = leaves_[entry.child & ~leaf_bit];
+      DistancesOf8 found;
+      kernels_->triangles(leaf.triangles, local, found);
+      for (int i = 0; i < 8; ++i) {
+        if (found.distance[i] > limit || leaf.face[i] == no_index) continue;
+        const auto corners = mesh_->corners(leaf.face[i]);
+        const TrianglePoint point = closest_point_on_triangle(p, corners[0], corners[1], corners[2]);
+        if (point.squared_distance > best_squared || (point.squared_distance == best_squared && best.face != no_index)) continue;
+        best_squared = point.squared_distance;
+        best = {leaf.face[i], point};
+        limit = static_cast<float>(std::sqrt(best_squared) * per_scale_) * 1.000001F + error;
+      }
+      continue;
+    }
+    const Node& node = nodes_[entry.child];
+    float squared[8];
+    unsigned mask = kernels_->boxes(node.boxes, local, limit * limit, squared);
+    const int first = top;
+    for (; mask != 0; mask &= mask - 1) {
+      const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+      int slot = top++;
+      for (; slot > first && stack[slot - 1].key < squared[i]; --slot) stack[slot] = stack[slot - 1];
+      stack[slot] = {squared[i], node.child[i]};
+    }
+  }
+  return best;
+}
+
+FirstHit Bvh::first_hit(const Segment& segment) const noexcept {
+  FirstHit first;
+  for_each_along(segment, 0.0, [&](std::uint32_t face) {
+    const auto corners = mesh_->corners(face);
+    double t = 0.0;
+    if (segment_triangle_intersection(segment, corners[0], corners[1], corners[2], t) &&
+        (t < first.t || first.face == no_index)) {
+      first = {face, t};
+    }
+    return first.face == no_index ? 1.0 : first.t;
+  });
+  return first;
+}
+
+namespace {
+
+/// The nearest leaves found so far, with the distance beyond which the list is no longer complete.
+class NearestLeaves {
+ public:
+  struct Entry {
+    float squared;
+    std::uint32_t leaf;
+    std::uint32_t node;  ///< that holds its box
+    std::uint32_t slot;
+    bool operator<(const Entry& other) const noexcept { return squared < other.squared; }
+  };
+
+  explicit NearestLeaves(float limit) noexcept : limit_(limit) {}
+  [[nodiscard]] float limit() const noexcept { return limit_; }
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  const Entry& operator[](std::uint32_t i) const noexcept { return entries_[i]; }
+
+  void offer(const Entry& entry) noexcept {
+    if (count_ == room) shrink();
+    if (entry.squared <= limit_ * limit_) entries_[count_++] = entry;
+  }
+  void finish() noexcept {
+    shrink();
+    std::sort(entries_, entries_ + count_);
+  }
+
+ private:
+  // Room above the patch's capacity, so that the farthest are dropped in bulk, not one by one.
+  static constexpr std::uint32_t room = 96;
+  static constexpr std::uint32_t keep = TrianglePatch::capacity;
+
+  void shrink() noexcept {
+    if (count_ <= keep) return;
+    std::nth_element(entries_, entries_ + keep, entries_ + count_);
+    limit_ = std::min(limit_, std::sqrt(entries_[keep].squared));
+    count_ = keep;
+  }
+
+  float limit_;
+  std::uint32_t count_ = 0;
+  Entry entries_[room];
+};
+
+}  // namespace
+
+void Bvh::gather(const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) const noexcept {
+  float local[3];
+  to_local(centre, local);
+  const float error = rounding(local);
+  NearestLeaves nearest(static_cast<float>(reach * per_scale_) + error);
+  Entry stack[stack_capacity];
+  int top = 0;
+  if (!nodes_.empty()) stack[top++] = {0.0F, 0};
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (entry.key > nearest.limit() * nearest.limit()) continue;
+    const Node& node = nodes_[entry.child];
+    float squared[8];
+    unsigned mask = kernels_->boxes(node.boxes, local, nearest.limit() * nearest.limit(), squared);
+    const int first = top;
+    for (; mask != 0; mask &= mask - 1) {
+      const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+      if ((node.child[i] & leaf_bit) != 0) {
+        nearest.offer({squared[i], node.child[i] & ~leaf_bit, entry.child, i});
+        continue;
+      }
+      int slot = top++;
+      for (; slot > first && stack[slot - 1].key < squared[i]; --slot) stack[slot] = stack[slot - 1];
+      stack[slot] = {squared[i], node.child[i]};
+    }
+  }
+  nearest.finish();
+
+  patch.owner = owner;
+  patch.centre = centre;
+  patch.certified = (static_cast<double>(nearest.limit()) - static_cast<double>(error)) * scale_;
+  patch.count = nearest.count();
+  for (std::uint32_t i = 0; i < (patch.count + 7) / 8 * 8; ++i) {
+    const bool used = i < patch.count;
+    const NearestLeaves::Entry& entry = nearest[used ? i : 0];
+    if (i % 8 == 0) patch.nearest[i / 8] = std::max(0.0F, std::sqrt(entry.squared) - error);
+    patch.leaf[i] = used ? entry.leaf : 0;
+    const BoxesOf8& from = nodes_[entry.node].boxes;
+    for (int axis = 0; axis < 3; ++axis) {
+      patch.boxes[i / 8].lower[axis][i % 8] = used ? from.lower[axis][entry.slot] : 1e30F;
+      patch.boxes[i / 8].upper[axis][i % 8] = used ? from.upper[axis][entry.slot] : -1e30F;
+    }
+  }
+}
+
+}  // namespace asperity

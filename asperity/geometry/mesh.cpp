@@ -1,0 +1,427 @@
+#include "asperity/geometry/mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "asperity/geometry/index_table.h"
+
+namespace asperity {
+namespace {
+
+using Triangle = TriangleMesh::Triangle;
+
+// Beyond these the squares and products of lengths that every query forms would leave the range of a double.
+constexpr double largest_coordinate = 1e60;
+constexpr double smallest_edge = 1e-60;
+constexpr double smallest_relative_area = 1e-12;
+constexpr std::size_t most_triangles = (std::size_t{1} << 32U) / 3 - 1;  // three 32-bit corner entries each
+
+Error bad_mesh(std::string what, std::string place, std::string accepted) {
+  return {ErrorCode::bad_mesh, std::move(what), {}, std::move(place), std::move(accepted)};
+}
+
+Status check_source(const MeshSource& source, const MeshBuildSettings& settings) {
+  if (!(settings.scale > 0.0) || !std::isfinite(settings.scale)) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("the mesh scale is {}", settings.scale),
+                 {},
+                 "scale",
+                 "a finite number above 0 (metres per unit of the file)"};
+  }
+  if (source.triangles.empty()) return bad_mesh("has no triangles", {}, "at least one triangle with area");
+  if (source.triangles.size() > most_triangles || source.positions.size() >= no_index) {
+    return bad_mesh("has too many triangles or vertices", {}, "up to 1.4e9 triangles and 4.2e9 vertices");
+  }
+  if (!source.corner_uvs.empty() && source.corner_uvs.size() != source.triangles.size()) {
+    return bad_mesh(fmt::format("has UVs for {} of {} triangles", source.corner_uvs.size(), source.triangles.size()),
+                    {}, "UVs for every triangle, or for none");
+  }
+  return success();
+}
+
+Status scale_positions(std::vector<Vec3>& positions, double scale) {
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    // Adding zero turns -0 into +0, so that equal coordinates have equal bits.
+    positions[i] = (positions[i] * scale).array() + 0.0;
+    if ((positions[i].array().abs() <= largest_coordinate).all()) continue;
+    const bool finite = positions[i].allFinite();
+    return bad_mesh(finite ? "has a coordinate beyond 1e60 m" : "has a coordinate that is not finite",
+                    fmt::format("vertex {} (counted from 0)", i), "finite coordinates");
+  }
+  return success();
+}
+
+Status check_uvs(const std::vector<std::array<Vec2f, 3>>& corner_uvs) {
+  for (std::size_t i = 0; i < corner_uvs.size(); ++i) {
+    const auto& uvs = corner_uvs[i];
+    if (uvs[0].allFinite() && uvs[1].allFinite() && uvs[2].allFinite()) continue;
+    return bad_mesh("has a texture coordinate that is not finite", fmt::format("triangle {} (counted from 0)", i),
+                    "finite texture coordinates");
+  }
+  return success();
+}
+
+std::uint64_t hash_of(const Vec3& position) {
+  std::uint64_t hash = mixed_bits(std::bit_cast<std::uint64_t>(position.x()));
+  hash = mixed_bits(hash + std::bit_cast<std::uint64_t>(position.y()));
+  return mixed_bits(hash + std::bit_cast<std::uint64_t>(position.z()));
+}
+
+/// Merges equal positions in place, in order of first use; answers where each source vertex went.
+std::vector<std::uint32_t> weld(std::vector<Vec3>& positions) {
+  std::vector<std::uint32_t> moved_to(positions.size());
+  IndexTable table(positions.size());
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const Vec3 position = positions[i];
+    const std::uint32_t same = table.find_or_insert(hash_of(position), kept,
+                                                    [&](std::uint32_t other) { return positions[other] == position; });
+    if (same == no_index) positions[kept] = position;
+    moved_to[i] = same == no_index ? kept++ : same;
+  }
+  positions.resize(kept);
+  return moved_to;
+}
+
+bool degenerate(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a;
+  const Vec3 ac = c - a;
+  const double longest_squared = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
+  if (longest_squared < smallest_edge * smallest_edge) return true;
+  // Divided first, so that the square inside the norm cannot underflow for a small triangle.
+  return 0.5 * (ab / longest_squared).cross(ac).norm() < smallest_relative_area;
+}
+
+std::uint64_t hash_of(const Triangle& sorted) {
+  return mixed_bits(mixed_bits((std::uint64_t{sorted[0]} << 32U) | sorted[1]) + sorted[2]);
+}
+
+Triangle sorted(Triangle triangle) {
+  if (triangle[0] > triangle[1]) std::swap(triangle[0], triangle[1]);
+  if (triangle[1] > triangle[2]) std::swap(triangle[1], triangle[2]);
+  if (triangle[0] > triangle[1]) std::swap(triangle[0], triangle[1]);
+  return triangle;
+}
+
+/// Points the triangles at the welded vertices. Errors: index out of range.
+Status remap_triangles(MeshSource& source, const std::vector<std::uint32_t>& moved_to) {
+  for (std::size_t i = 0; i < source.triangles.size(); ++i) {
+    for (std::uint32_t& corner : source.triangles[i]) {
+      if (corner >= moved_to.size()) {
+        return bad_mesh(fmt::format("refers to vertex {} of {}", corner, moved_to.size()),
+                        fmt::format("triangle {} (counted from 0)", i),
+                        fmt::format("vertex indices from 0 to {}", std::ptrdiff_t(moved_to.size()) - 1));
+      }
+      corner = moved_to[corner];
+    }
+  }
+  return success();
+}
+
+/// Removes triangles without area and repeated ones, keeping order and UVs aligned.
+void drop_unusable_triangles(MeshSource& source, MeshReport& report) {
+  IndexTable table(source.triangles.size());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < source.triangles.size(); ++i) {
+    const Triangle triangle = source.triangles[i];
+    const auto& p = source.positions;
+    if (degenerate(p[triangle[0]], p[triangle[1]], p[triangle[2]])) {
+      ++report.dropped_degenerate;
+      continue;
+    }
+    const Triangle key = sorted(triangle);
+    const std::uint32_t same =
+        table.find_or_insert(hash_of(key), static_cast<std::uint32_t>(kept),
+                             [&](std::uint32_t other) { return sorted(source.triangles[other]) == key; });
+    if (same != no_index) {
+      ++report.dropped_duplicate;
+      continue;
+    }
+    source.triangles[kept] = triangle;
+    if (!source.corner_uvs.empty()) source.corner_uvs[kept] = source.corner_uvs[i];
+    ++kept;
+  }
+  source.triangles.resize(kept);
+  if (!source.corner_uvs.empty()) source.corner_uvs.resize(kept);
+}
+
+/// Removes vertices that no triangle uses; answers how many.
+std::size_t drop_unused_vertices(MeshSource& source) {
+  std::vector<std::uint32_t> moved_to(source.positions.size(), no_index);
+  for (const Triangle& triangle : source.triangles) {
+    for (const std::uint32_t corner : triangle) moved_to[corner] = 0;
+  }
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < moved_to.size(); ++i) {
+    if (moved_to[i] == no_index) continue;
+    source.positions[kept] = source.positions[i];
+    moved_to[i] = kept++;
+  }
+  const std::size_t dropped = source.positions.size() - kept;
+  if (dropped == 0) return 0;
+  source.positions.resize(kept);
+  for (Triangle& triangle : source.triangles) {
+    for (std::uint32_t& corner : triangle) corner = moved_to[corner];
+  }
+  return dropped;
+}
+
+std::uint32_t find_root(std::vector<std::uint32_t>& parents, std::uint32_t element) {
+  while (parents[element] != element) {
+    parents[element] = parents[parents[element]];
+    element = parents[element];
+  }
+  return element;
+}
+
+/// Joins two sets; answers whether they were apart.
+bool join(std::vector<std::uint32_t>& parents, std::uint32_t a, std::uint32_t b) {
+  a = find_root(parents, a);
+  b = find_root(parents, b);
+  if (a == b) return false;
+  parents[std::max(a, b)] = std::min(a, b);
+  return true;
+}
+
+std::size_t count_components(std::size_t vertices, const std::vector<Triangle>& triangles) {
+  std::vector<std::uint32_t> parents(vertices);
+  for (std::size_t i = 0; i < vertices; ++i) parents[i] = static_cast<std::uint32_t>(i);
+  std::size_t components = vertices;
+  for (const Triangle& t : triangles) {
+    if (join(parents, t[0], t[1])) --components;
+    if (join(parents, t[0], t[2])) --components;
+  }
+  return components;
+}
+
+/// Walks the edges vertex by vertex: the edges at one vertex are few and lie together in memory, so that sorting them
+/// there is several times faster than one sort over all edges.
+class EdgeSurvey {
+ public:
+  EdgeSurvey(const TriangleMesh& mesh, MeshReport& report) : mesh_(mesh), report_(report) {}
+
+  void run() {
+    report_.min_edge = infinity;
+    for (std::uint32_t vertex = 0; vertex < mesh_.positions().size(); ++vertex) survey(vertex);
+    report_.mean_edge = edges_ == 0 ? 0.0 : length_sum_ / static_cast<double>(edges_);
+  }
+
+ private:
+  /// One triangle's use of the edge between the surveyed vertex and `other`.
+  struct Use {
+    std::uint32_t other;
+    std::uint32_t fan_and_direction;  ///< position in the vertex's face list, times two, plus one if it leaves
+    friend bool operator<(const Use& a, const Use& b) { return a.other < b.other; }
+  };
+
+  void survey(std::uint32_t vertex) {
+    const auto faces = mesh_.faces_of_vertex(vertex);
+    uses_.clear();
+    parents_.resize(faces.size());
+    for (std::uint32_t i = 0; i < faces.size(); ++i) {
+      const Triangle& t = mesh_.triangles()[faces[i]];
+      const std::size_t corner = t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+      uses_.push_back({t[(corner + 1) % 3], 2 * i + 1});
+      uses_.push_back({t[(corner + 2) % 3], 2 * i});
+      parents_[i] = i;
+    }
+    std::sort(uses_.begin(), uses_.end());
+    std::size_t fans = faces.size();
+    for (std::size_t first = 0; first < uses_.size();) {
+      std::size_t last = first + 1;
+      for (; last < uses_.size() && uses_[last].other == uses_[first].other; ++last) {
+        if (join(parents_, uses_[first].fan_and_direction / 2, uses_[last].fan_and_direction / 2)) --fans;
+      }
+      if (uses_[first].other > vertex) count_edge(vertex, first, last);
+      first = last;
+    }
+    if (fans > 1) ++report_.nonmanifold_vertices;
+  }
+
+  void count_edge(std::uint32_t vertex, std::size_t first, std::size_t last) {
+    const double length = (mesh_.positions()[vertex] - mesh_.positions()[uses_[first].other]).norm();
+    ++edges_;
+    length_sum_ += length;
+    report_.min_edge = std::min(report_.min_edge, length);
+    report_.max_edge = std::max(report_.max_edge, length);
+    if (last - first == 1) ++report_.boundary_edges;
+    if (last - first > 2) ++report_.nonmanifold_edges;
+    const bool same_way = (uses_[first].fan_and_direction & 1U) == (uses_[last - 1].fan_and_direction & 1U);
+    if (last - first == 2 && same_way) ++report_.misoriented_edges;
+  }
+
+  const TriangleMesh& mesh_;
+  MeshReport& report_;
+  std::vector<Use> uses_;
+  std::vector<std::uint32_t> parents_;
+  std::size_t edges_ = 0;
+  double length_sum_ = 0.0;
+};
+
+/// Area, volume and the worst aspect ratio. The volume is summed about `centre`, which costs a mesh far from the
+/// origin no digits.
+void measure_triangles(const TriangleMesh& mesh, const Vec3& centre, MeshReport& report) {
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto [a, b, c] = mesh.corners(face);
+    const Vec3 cross = (b - a).cross(c - a);
+    const double doubled_area = cross.norm();
+    const double longest = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+    report.area += 0.5 * doubled_area;
+    report.signed_volume += cross.dot(a - centre) / 6.0;
+    report.worst_aspect = std::max(report.worst_aspect, longest / doubled_area);
+  }
+}
+
+/// Interior angles of a triangle (rad). By atan2, which stays accurate for slivers where the cosine does not.
+Vec3 corner_angles(const Vec3& ab, const Vec3& ac, double doubled_area) {
+  const double at_a = std::atan2(doubled_area, ab.dot(ac));
+  const double at_b = std::atan2(doubled_area, ab.dot(ab - ac));
+  return {at_a, at_b, std::max(0.0, std::numbers::pi - at_a - at_b)};
+}
+
+std::vector<Vec3f> angle_weighted_normals(const TriangleMesh& mesh) {
+  std::vector<Vec3> sums(mesh.positions().size(), Vec3::Zero());
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto [a, b, c] = mesh.corners(face);
+    const Vec3 cross = (b - a).cross(c - a);
+    const double doubled_area = cross.norm();
+    const Vec3 angles = corner_angles(b - a, c - a, doubled_area);
+    const Vec3 normal = cross / doubled_area;
+    const Triangle& t = mesh.triangles()[face];
+    sums[t[0]] += angles[0] * normal;
+    sums[t[1]] += angles[1] * normal;
+    sums[t[2]] += angles[2] * normal;
+  }
+  std::vector<Vec3f> normals(sums.size());
+  for (std::uint32_t vertex = 0; vertex < sums.size(); ++vertex) {
+    const double length = sums[vertex].norm();
+    // Triangles that face each other can cancel: any one of their normals is then as good as another.
+    const Vec3 unit = length > 1e-9 ? Vec3(sums[vertex] / length) : mesh.face_normal(mesh.faces_of_vertex(vertex)[0]);
+    normals[vertex] = unit.cast<float>();
+  }
+  return normals;
+}
+
+void list_faces_of_vertices(std::size_t vertices, const std::vector<Triangle>& triangles,
+                            std::vector<std::uint32_t>& offsets, std::vector<std::uint32_t>& faces) {
+  offsets.assign(vertices + 1, 0);
+  for (const Triangle& t : triangles) {
+    for (const std::uint32_t corner : t) ++offsets[corner + 1];
+  }
+  for (std::size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
+  faces.resize(3 * triangles.size());
+  // Filling moves each start to the next vertex's start; shifting them back afterwards saves a second array.
+  for (std::uint32_t face = 0; face < triangles.size(); ++face) {
+    for (const std::uint32_t corner : triangles[face]) faces[offsets[corner]++] = face;
+  }
+  for (std::size_t i = vertices; i > 0; --i) offsets[i] = offsets[i - 1];
+  offsets[0] = 0;
+}
+
+void flip_all(std::vector<Triangle>& triangles, std::vector<std::array<Vec2f, 3>>& corner_uvs) {
+  for (Triangle& t : triangles) std::swap(t[1], t[2]);
+  for (auto& uvs : corner_uvs) std::swap(uvs[1], uvs[2]);
+}
+
+void add_notes(const MeshReport& report, std::size_t unused_vertices, std::vector<std::string>& notes) {
+  const auto note = [&](std::size_t count, const char* text) {
+    if (count > 0) notes.push_back(fmt::format("{} {}", count, text));
+  };
+  note(report.welded_vertices, "vertices merged with another at the same position");
+  note(report.dropped_degenerate, "triangles without area left out");
+  note(report.dropped_duplicate, "triangles with the same corners as an earlier one left out");
+  note(unused_vertices, "vertices that no triangle uses left out");
+}
+
+}  // namespace
+
+Result<TriangleMesh> TriangleMesh::build(MeshSource source, const MeshBuildSettings& settings) {
+  ASPERITY_CHECK(check_source(source, settings));
+  ASPERITY_CHECK(scale_positions(source.positions, settings.scale));
+  ASPERITY_CHECK(check_uvs(source.corner_uvs));
+  TriangleMesh mesh;
+  MeshReport& report = mesh.report_;
+  const std::size_t source_vertices = source.positions.size();
+  const std::vector<std::uint32_t> moved_to = weld(source.positions);
+  report.welded_vertices = source_vertices - source.positions.size();
+  ASPERITY_CHECK(remap_triangles(source, moved_to));
+  drop_unusable_triangles(source, report);
+  if (source.triangles.empty()) {
+    return bad_mesh(fmt::format("none of its {} triangles has an area", report.dropped_degenerate), {},
+                    "at least one triangle whose corners are not in one line");
+  }
+  const std::size_t unused_vertices = drop_unused_vertices(source);
+  mesh.notes_ = std::move(source.notes);
+  add_notes(report, unused_vertices, mesh.notes_);
+  mesh.take(std::move(source));
+  mesh.derive(settings.orient_outward);
+  return mesh;
+}
+
+void TriangleMesh::take(MeshSource source) {
+  positions_ = std::move(source.positions);
+  triangles_ = std::move(source.triangles);
+  corner_uvs_ = std::move(source.corner_uvs);
+  positions_.shrink_to_fit();
+  triangles_.shrink_to_fit();
+  corner_uvs_.shrink_to_fit();
+}
+
+void TriangleMesh::derive(bool orient_outward) {
+  report_.vertices = positions_.size();
+  report_.triangles = triangles_.size();
+  for (const Vec3& position : positions_) bounds_.include(position);
+  list_faces_of_vertices(positions_.size(), triangles_, vertex_offsets_, vertex_faces_);
+  EdgeSurvey(*this, report_).run();
+  report_.components = count_components(positions_.size(), triangles_);
+  measure_triangles(*this, bounds_.centre(), report_);
+  if (orient_outward && report_.closed() && report_.oriented() && report_.signed_volume < 0.0) {
+    flip_all(triangles_, corner_uvs_);
+    report_.signed_volume = -report_.signed_volume;
+    notes_.emplace_back("normals pointed inward: all triangles were flipped");
+  }
+  vertex_normals_ = angle_weighted_normals(*this);
+}
+
+Vec3 TriangleMesh::face_normal(std::uint32_t face) const noexcept {
+  const auto [a, b, c] = corners(face);
+  return (b - a).cross(c - a).normalized();
+}
+
+std::uint32_t TriangleMesh::neighbour(std::uint32_t face, int edge) const noexcept {
+  const Triangle& corners = triangles_[face];
+  const auto first = static_cast<std::size_t>(edge);
+  std::span<const std::uint32_t> few = faces_of_vertex(corners[first]);
+  std::span<const std::uint32_t> many = faces_of_vertex(corners[(first + 1) % 3]);
+  if (few.size() > many.size()) std::swap(few, many);
+  std::uint32_t found = no_index;
+  auto from = many.begin();
+  for (const std::uint32_t candidate : few) {
+    from = std::lower_bound(from, many.end(), candidate);
+    if (from == many.end()) break;
+    if (*from != candidate || candidate == face) continue;
+    if (found != no_index) return no_index;
+    found = candidate;
+  }
+  return found;
+}
+
+std::size_t TriangleMesh::memory_bytes() const noexcept {
+  std::size_t bytes = sizeof(*this);
+  const auto add = [&](const auto& values) { bytes += values.capacity() * sizeof(values[0]); };
+  add(positions_);
+  add(triangles_);
+  add(corner_uvs_);
+  add(vertex_normals_);
+  add(vertex_offsets_);
+  add(vertex_faces_);
+  add(notes_);
+  for (const std::string& note : notes_) bytes += note.capacity();
+  return bytes;
+}
+
+}  // namespace asperity

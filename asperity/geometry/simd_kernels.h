@@ -1,0 +1,46 @@
+#pragma once
+// The two inner loops of every search: distances from a point to eight boxes, and to eight triangles.
+// Each exists twice: plain C++, the oracle and the fallback, and AVX2, chosen once by what the processor has.
+// Results are single precision and only ever used to discard; what remains is decided in double precision.
+
+#include <cstdint>
+
+namespace asperity {
+
+/// Eight boxes side by side. An empty slot has lower = +inf, upper = -inf.
+struct alignas(32) BoxesOf8 {
+  float lower[3][8];
+  float upper[3][8];
+};
+
+/// Eight triangles side by side: a corner and the two edges from it. An unused slot lies far away.
+struct alignas(32) TrianglesOf8 {
+  float corner[3][8];
+  float edge1[3][8];
+  float edge2[3][8];
+};
+
+/// Vectors from the closest points of eight triangles to a point, and their lengths.
+struct alignas(32) DistancesOf8 {
+  float offset[3][8];
+  float distance[8];
+};
+
+/// One implementation of the inner loops. All functions are pure. [servo]
+struct SearchKernels {
+  const char* name;
+  /// Squared distances (m²) from `point` to eight boxes; answers a bit mask of those <= `bound`.
+  unsigned (*boxes)(const BoxesOf8& boxes, const float point[3], float bound, float squared[8]) noexcept;
+  /// Entry parameters of the line origin + t * direction (t in 0 … `t_end`) into eight boxes grown by `margin`;
+  /// answers a bit mask of the boxes met.
+  unsigned (*ray)(const BoxesOf8& boxes, const float origin[3], const float inverse_direction[3], float t_end,
+                  float margin, float entry[8]) noexcept;
+  /// Closest points of eight triangles to `point`.
+  void (*triangles)(const TrianglesOf8& triangles, const float point[3], DistancesOf8& out) noexcept;
+};
+
+const SearchKernels& plain_kernels() noexcept;
+/// The fastest kernels this processor can run.
+const SearchKernels& best_kernels() noexcept;
+
+}  // namespace asperity

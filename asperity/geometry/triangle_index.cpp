@@ -1,0 +1,296 @@
+#include "asperity/geometry/triangle_index.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+namespace asperity {
+
+namespace {
+
+// The skin is large against double rounding of the coordinates and small against any feature of the mesh.
+constexpr double skin_of_mean_edge = 1e-5;
+constexpr double least_skin_of_size = 1e-9;
+// A motion may come this fraction of a skin nearer than a resting probe before it counts as a touch: sliding along a
+// plane is no touch, whatever its rounding.
+constexpr double slack_of_skin = 0.25;
+// A touch found within this fraction of the slack is a touch.
+constexpr double touch_of_slack = 0.01;
+constexpr int newton_limit = 32;
+// Two contacts whose normals differ by less than this angle (rad) are one plane: their common line is undefined.
+constexpr double same_plane_cosine = 1.0 - 1e-10;
+// Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
+constexpr double long_motion_in_edges = 12.0;
+constexpr double patch_slack_in_edges = 4.0;
+// A ball resting within this many skins of a triangle touches it.
+constexpr double touch_in_skins = 2.0;
+std::uint64_t next_identity() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+void gather_from(const Bvh& bvh, const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) noexcept {
+  bvh.gather(centre, reach, owner, patch);
+}
+
+// The octree keeps to the papers and has no gathering of its own: an empty certificate sends every query to the tree.
+void gather_from(const TriangleOctree&, const Vec3& centre, double, std::uint64_t owner, TrianglePatch& patch) noexcept {
+  patch.owner = owner;
+  patch.centre = centre;
+  patch.certified = 0.0;
+  patch.count = 0;
+}
+
+template <class Visit>
+void along(const Bvh& bvh, const Segment& motion, double radius, Visit&& visit) noexcept {
+  bvh.for_each_along(motion, radius, visit);
+}
+
+template <class Visit>
+void along(const TriangleOctree& octree, const Segment& motion, double radius, Visit&& visit) noexcept {
+  Box box;
+  box.include(motion.from);
+  box.include(motion.to);
+  octree.for_each_in_box(box.grown(radius), [&](std::uint32_t face) { visit(face); });
+}
+
+}  // namespace
+
+TriangleIndex TriangleIndex::build(TriangleMesh mesh, SearchStructure structure, const BvhSettings& settings) {
+  TriangleIndex index;
+  index.mesh_ = std::make_unique<const TriangleMesh>(std::move(mesh));
+  index.identity_ = next_identity();
+  index.skin_ = std::max(skin_of_mean_edge * index.mesh_->mean_edge(), least_skin_of_size * index.mesh_->bounds().diagonal());
+  const Box& bounds = index.mesh_->bounds();
+  const double size = bounds.diagonal() + bounds.lower.cwiseAbs().cwiseMax(bounds.upper.cwiseAbs()).norm();
+  index.rounding_ = 64.0 * std::numeric_limits<double>::epsilon() * size;
+  if (structure == SearchStructure::bvh) {
+    index.structure_ = std::make_unique<const std::variant<Bvh, TriangleOctree>>(Bvh::build(*index.mesh_, settings));
+  } else {
+    index.structure_ = std::make_unique<const std::variant<Bvh, TriangleOctree>>(TriangleOctree::build(*index.mesh_));
+  }
+  return index;
+}
+
+std::size_t TriangleIndex::memory_bytes() const noexcept {
+  return mesh_->memory_bytes() + std::visit([](const auto& structure) { return structure.memory_bytes(); }, *structure_);
+}
+
+FirstHit TriangleIndex::first_hit(const Segment& segment) const noexcept {
+  return std::visit([&](const auto& structure) { return structure.first_hit(segment); }, *structure_);
+}
+
+Foot TriangleIndex::surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p, const Vec3& face_normal) const noexcept {
+  Foot answer;
+  answer.point = point.point;
+  answer.distance = std::sqrt(point.squared_distance);
+  answer.element = face;
+  answer.barycentric = point.barycentric;
+  const Vec3 offset = p - point.point;
+  const double side = offset.dot(face_normal) < 0.0 ? -1.0 : 1.0;
+  answer.normal = side * face_normal;
+  if (point.barycentric.minCoeff() > 0.0 || answer.distance <= rounding_) return answer;
+  // The direction of a short offset is rounding; where it agrees with the face within that rounding, it is the face's.
+  if ((offset - answer.distance * answer.normal).norm() > rounding_) answer.normal = offset / answer.distance;
+  return answer;
+}
+
+Foot TriangleIndex::closest(const Vec3& p, double bound) const noexcept {
+  const ClosestHit hit = std::visit([&](const auto& structure) { return structure.closest(p, bound); }, *structure_);
+  return hit.face == no_index ? Foot{} : surface_foot(hit.face, hit.point, p, mesh_->face_normal(hit.face));
+}
+
+Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept {
+  const Bvh* bvh = std::get_if<Bvh>(structure_.get());
+  const double room = patch.certified - (p - patch.centre).norm();
+  if (bvh != nullptr && patch.owner == identity_ && patch.count > 0 && room > 0.0) {
+    const double error = bvh->error(p);
+    TrianglePoint best;
+    std::uint32_t best_face = no_index;
+    double reach = std::min(bound, room);
+    bvh->scan(patch, p, reach, [&](std::uint32_t face, double distance, const Vec3&) {
+      if (distance > reach + error) return;
+      const auto [a, b, c] = mesh_->corners(face);
+      const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
+      if (point.squared_distance >= best.squared_distance) return;
+      best = point;
+      best_face = face;
+      reach = std::min(reach, std::sqrt(point.squared_distance));
+    });
+    if (best_face != no_index && std::sqrt(best.squared_distance) < std::min(room, bound)) {
+      return surface_foot(best_face, best, p, mesh_->face_normal(best_face));
+    }
+  }
+  const Foot answer = closest(p, bound);
+  if (answer.found()) gather(p, answer.distance + patch_slack_in_edges * mesh_->mean_edge(), patch);
+  return answer;
+}
+
+void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
+  std::visit([&](const auto& structure) { gather_from(structure, centre, reach, identity_, patch); }, *structure_);
+}
+
+bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept {
+  if (patch.covers(identity_, position, reach)) return true;
+  patch.rested = false;
+  // Where a patch filled nearby was too small, more triangles lie within reach than it can hold: do not try again.
+  const double edge = mesh_->mean_edge();
+  if (patch.owner == identity_ && patch.certified < reach && (position - patch.centre).norm() < edge) return false;
+  gather(position, reach + patch_slack_in_edges * edge, patch);
+  return patch.covers(identity_, position, reach);
+}
+
+void TriangleIndex::sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides,
+                               SweptHit& best) const noexcept {
+  const auto [a, b, c] = mesh_->corners(face);
+  const Vec3 direction = motion.to - motion.from;
+  if (sides == Sides::front && (b - a).cross(c - a).dot(motion.from - a) < 0.0) return;
+  const double touch = radius + touch_of_slack * slack_of_skin * skin_;
+  double t = 0.0;
+  TrianglePoint at;
+  for (int i = 0; i < newton_limit; ++i) {
+    const Vec3 x = motion.from + t * direction;
+    at = closest_point_on_triangle(x, a, b, c);
+    const double distance = std::sqrt(at.squared_distance);
+    // d(distance)/dt: the distance is convex along the motion, so the tangent never overshoots its first root.
+    // Exactly on a sheet its side is not decided yet: the motion away from it decides.
+    if (distance == 0.0 && (sides == Sides::both || (b - a).cross(c - a).dot(direction) >= 0.0)) return;
+    const double slope = distance > 0.0 ? (x - at.point).dot(direction) / distance : -1.0;
+    if (slope >= 0.0) return;
+    if (distance <= touch) break;
+    t += (distance - radius) / -slope;
+    if (t >= best.t) return;
+  }
+  best.hit = true;
+  best.t = t;
+  best.contact = surface_foot(face, at, motion.from + t * direction, (b - a).cross(c - a).normalized());
+}
+
+template <class Visit>
+void TriangleIndex::scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept {
+  if (const Bvh* bvh = std::get_if<Bvh>(structure_.get())) {
+    if (ensure(position, reach, patch)) {
+      bvh->scan(patch, position, reach, visit);
+    } else {
+      bvh->scan(position, reach, visit);
+    }
+    return;
+  }
+  Box box;
+  box.include(position);
+  std::get_if<TriangleOctree>(structure_.get())->for_each_in_box(box.grown(reach), [&](std::uint32_t face) {
+    const auto [a, b, c] = mesh_->corners(face);
+    const TrianglePoint at = closest_point_on_triangle(position, a, b, c);
+    visit(face, std::sqrt(at.squared_distance), Vec3(position - at.point));
+  });
+}
+
+double TriangleIndex::error(const Vec3& position) const noexcept {
+  const Bvh* bvh = std::get_if<Bvh>(structure_.get());
+  return bvh != nullptr ? bvh->error(position) : 0.0;
+}
+
+SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
+  const Vec3 direction = motion.to - motion.from;
+  const double length = direction.norm();
+  const double grown = radius + (1.0 - slack_of_skin) * skin_;
+  SweptHit best;
+  if (length == 0.0) return best;
+  if (length > long_motion_in_edges * mesh_->mean_edge()) {
+    std::visit(
+        [&](const auto& structure) {
+          along(structure, motion, grown, [&](std::uint32_t face) {
+            sweep_face(face, motion, grown, sides, best);
+            return best.t;
+          });
+        },
+        *structure_);
+    return best;
+  }
+  const double margin = error(motion.from);
+  const double touch = radius + touch_in_skins * skin_;
+  const auto resting_on = [&](std::uint32_t face) {
+    // What the ball rests on cannot be hit by a motion that does not go into it.
+    if (!patch.rested || patch.rest_position != motion.from || patch.rest_radius != radius) return false;
+    for (const Foot& contact : patch.rest_contacts) {
+      if (contact.element == face) return contact.distance + std::min(0.0, contact.normal.dot(direction)) >= grown;
+    }
+    return false;
+  };
+  FixedVector<std::uint32_t, 16> near_end;
+  bool all_near_end = true;
+  scan_ball(motion.from, touch + length, patch, [&](std::uint32_t face, double distance, const Vec3& offset) {
+    // The distance is convex: along the motion it stays above its tangent at the start.
+    const double bound = distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
+    if (bound > touch) return;
+    if ((bound <= grown || distance <= grown + margin) && !resting_on(face)) sweep_face(face, motion, grown, sides, best);
+    all_near_end = near_end.push_back(face) && all_near_end;
+  });
+  if (!best.hit && all_near_end) {
+    // What touches at the end was among them: the next question is about the contacts there.
+    ContactSet contacts;
+    for (const std::uint32_t face : near_end) add_contact(face, motion.to, touch, sides, contacts);
+    drop_implied(contacts);
+    remember(motion.to, radius, sides, contacts, patch);
+  }
+  return best;
+}
+
+void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
+                                ContactSet& out) const noexcept {
+  const auto [a, b, c] = mesh_->corners(face);
+  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
+  if (point.squared_distance > reach * reach) return;
+  const Vec3 cross = (b - a).cross(c - a);
+  if (sides == Sides::front && cross.dot(position - a) < 0.0) return;
+  const Foot contact = surface_foot(face, point, position, cross.normalized());
+  for (Foot& other : out) {
+    if (contact.normal.dot(other.normal) < same_plane_cosine) continue;
+    if (contact.distance < other.distance) other = contact;
+    return;
+  }
+  out.push_back(contact);
+}
+
+// The plane of a touched face keeps the ball off every edge that does not rise over it. Keeping such an edge as a plane of its
+// own would hold a point back at every convex edge it crosses, as if it rolled over it.
+void TriangleIndex::drop_implied(ContactSet& contacts) const noexcept {
+  for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
+    if (contacts[i].barycentric.minCoeff() > 0.0) continue;
+    for (const Foot& face : contacts) {
+      if (&face == &contacts[i] || face.barycentric.minCoeff() <= 0.0) continue;
+      if (face.normal.dot(contacts[i].point - face.point) > rounding_) continue;
+      contacts.swap_remove(i);
+      break;
+    }
+  }
+}
+
+void TriangleIndex::remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
+                             TrianglePatch& patch) const noexcept {
+  patch.rested = patch.owner == identity_ && contacts.size() <= patch.rest_contacts.capacity();
+  if (!patch.rested) return;
+  patch.rest_position = position;
+  patch.rest_radius = radius;
+  patch.rest_sides = sides;
+  patch.rest_contacts.clear();
+  for (const Foot& contact : contacts) patch.rest_contacts.push_back(contact);
+}
+
+void TriangleIndex::contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch,
+                             ContactSet& out) const noexcept {
+  if (patch.rested && patch.owner == identity_ && patch.rest_position == position && patch.rest_radius == radius &&
+      patch.rest_sides == sides) {
+    for (const Foot& contact : patch.rest_contacts) out.push_back(contact);
+    return;
+  }
+  const double reach = radius + touch_in_skins * skin_;
+  const double margin = error(position);
+  scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
+    if (distance <= reach + margin) add_contact(face, position, reach, sides, out);
+  });
+  drop_implied(out);
+  remember(position, radius, sides, out, patch);
+}
+
+}  // namespace asperity

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <memory>
+#include <variant>
+
+#include "asperity/geometry/bvh.h"
+#include "asperity/geometry/contact.h"
+#include "asperity/geometry/octree.h"
+#include "asperity/geometry/triangle_patch.h"
+
+namespace asperity {
+
+enum class SearchStructure { bvh, octree };
+
+/// One query interface over a mesh and either search structure. Owns both mesh and structure.
+///
+/// Elementary queries are exact. The swept queries treat the probe as a ball of radius r plus a thin `skin` (1e-5 of
+/// the mean edge): resting on the surface means resting one skin above it, which keeps rounding from
+/// ever carrying a probe through; the laws subtract the skin again, so forces do not contain it.
+///
+/// Distance to a triangle is a convex function along a straight motion, so Newton's method from
+/// the start approaches the first contact from outside and never passes it: no tunnelling, at any speed.
+class TriangleIndex {
+ public:
+  /// [build]
+  static TriangleIndex build(TriangleMesh mesh, SearchStructure structure = SearchStructure::bvh,
+                             const BvhSettings& settings = {});
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  /// Identity that tells patches of different indices apart; never 0.
+  [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
+  /// Thickness that separates a resting probe from the surface (m).
+  [[nodiscard]] double skin() const noexcept { return skin_; }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+
+  /// Nearest point of the surface within `bound` (m); found() is false when there is none. [servo]
+  [[nodiscard]] Foot closest(const Vec3& p, double bound) const noexcept;
+  /// The same, from the patch when its certificate allows, else from the structure; exact either way. [servo]
+  [[nodiscard]] Foot closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept;
+  /// First triangle met by the segment, from either side. [servo]
+  [[nodiscard]] FirstHit first_hit(const Segment& segment) const noexcept;
+  /// Calls visit(face) for every triangle whose bounding box meets `box`; may repeat a face with the octree. [servo]
+  template <class Visit>
+  void for_each_in_box(const Box& box, Visit&& visit) const {
+    std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, *structure_);
+  }
+
+  /// First touch of a ball of `radius` (m, plus skin) moving along `motion`. Triangles seen from behind at the start
+  /// are passed through when `sides` is front. [servo]
+  [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept;
+  /// Every distinct plane that a ball of `radius` (m) resting at `position` touches within two skins. [servo]
+  void contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch, ContactSet& out) const noexcept;
+
+ private:
+  TriangleIndex() = default;
+  /// Whether the patch covers the ball (position, reach), refilling it where that can help.
+  bool ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept;
+  void gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept;
+  /// Calls visit(face, distance, offset) for every triangle within `reach` of `position`, from the patch where it suffices.
+  template <class Visit>
+  void scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept;
+  /// Bound on the error of the distances that scan_ball gives (m).
+  [[nodiscard]] double error(const Vec3& position) const noexcept;
+  /// Leaves out edges and corners that the plane of a touched face keeps the ball off anyway.
+  void drop_implied(ContactSet& contacts) const noexcept;
+  void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts, TrianglePatch& patch) const noexcept;
+  [[nodiscard]] Foot surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p, const Vec3& face_normal) const noexcept;
+  void sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides, SweptHit& best) const noexcept;
+  void add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides, ContactSet& out) const noexcept;
+
+  // Behind pointers so that moving the index keeps the structure's reference to the mesh valid.
+  std::unique_ptr<const TriangleMesh> mesh_;
+  std::unique_ptr<const std::variant<Bvh, TriangleOctree>> structure_;
+  std::uint64_t identity_ = 0;
+  double skin_ = 0.0;
+  double rounding_ = 0.0;  ///< of a coordinate, with room (m)
+};
+
+}  // namespace asperity

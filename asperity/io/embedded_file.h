@@ -1,0 +1,19 @@
+#pragma once
+// Files that are part of the library (cmake/EmbedFiles.cmake).
+
+#include <span>
+#include <string_view>
+
+namespace asperity {
+
+struct EmbeddedFile {
+  std::string_view name;  ///< without folder: "icosphere.json"
+  std::string_view text;
+};
+
+/// The built-in scenes, in the order they are listed to people. [any]
+std::span<const EmbeddedFile> embedded_scenes();
+/// The schema of scene files. [any]
+std::span<const EmbeddedFile> embedded_schema();
+
+}  // namespace asperity

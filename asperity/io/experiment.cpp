@@ -1,0 +1,174 @@
+#include "asperity/io/experiment.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "asperity/io/scene_reader.h"
+
+namespace asperity {
+namespace {
+
+constexpr int format_version = 1;
+constexpr std::size_t most_surfaces = 1024;
+
+Result<std::string> read_text(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return Error{ErrorCode::file_missing, "is a folder", file.string(), {}, "a scene file (JSON)"};
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return Error{ErrorCode::file_missing, "cannot be read: no such file, or no permission", file.string(), {}, "a scene file (JSON)"};
+  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  return text;
+}
+
+/// Bounds of the base meshes in the world frame: what strokes are laid over and shares refer to.
+Box base_bounds(std::span<const Instance> instances) {
+  Box bounds;
+  for (const Instance& instance : instances) {
+    const Box local = base_mesh(instance.surface).bounds();
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      bounds.include(instance.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
+                                                           (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
+                                                           (corner & 4U) != 0 ? local.upper.z() : local.lower.z())));
+    }
+  }
+  return bounds;
+}
+
+const MeshSurface& base_surface(const Surface& surface) {
+  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();
+  return **std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
+}
+
+/// The nearest point of all base meshes with its outward pseudonormal.
+SurfaceProjector projector(const Scene& scene) {
+  return [&scene, hints = std::vector<Hint>(scene.instances().size())](const Vec3& p) mutable {
+    SurfacePoint best{p, Vec3::Zero()};
+    double nearest = infinity;
+    for (std::size_t i = 0; i < scene.instances().size(); ++i) {
+      const Instance& instance = scene.instances()[i];
+      const MeshSurface& base = base_surface(instance.surface);
+      const Foot foot = base.closest(instance.world_from_object.apply_inverse(p), infinity, hints[i]);
+      if (!foot.found() || foot.distance >= nearest) continue;
+      nearest = foot.distance;
+      best.point = instance.world_from_object.apply(foot.point);
+      best.normal = instance.world_from_object.rotate(pseudonormal(base.mesh(), foot.element, foot.barycentric)).normalized();
+    }
+    return best;
+  };
+}
+
+Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& context, SceneJson& canonical) {
+  const SceneJson* surfaces = root.raw("surfaces");
+  const char* accepted = "an array of surfaces, each at least {\"mesh\": file}";
+  if (surfaces == nullptr) {
+    root.fail("surfaces", "is missing", accepted);
+  } else if (!surfaces->is_array()) {
+    root.fail_type("surfaces", *surfaces, accepted);
+  } else if (surfaces->empty() || surfaces->size() > most_surfaces) {
+    root.fail("surfaces", fmt::format("has {} entries", surfaces->size()), fmt::format("1 to {} surfaces", most_surfaces));
+  }
+  ASPERITY_CHECK(root.status());
+  std::vector<Instance> instances;
+  canonical = SceneJson::array();
+  for (std::size_t i = 0; i < surfaces->size(); ++i) {
+    ASPERITY_TRY(ScenePart<Instance> part, read_surface((*surfaces)[i], fmt::format("surfaces[{}]", i), context));
+    instances.push_back(std::move(part.value));
+    canonical.push_back(std::move(part.canonical));
+  }
+  return instances;
+}
+
+void read_heading(ObjectReader& root, const std::string& fallback, std::string& name) {
+  const int version = root.integer("asperity", format_version, 1, 1000000);
+  if (version != format_version) {
+    root.fail("asperity", fmt::format("is {}, a newer format than this program reads", version), fmt::format("{}", format_version),
+              ErrorCode::file_unsupported);
+  }
+  name = root.text("name", fallback);
+  if (root.has("summary")) root.text("summary", {});
+  if (root.has("$schema")) root.text("$schema", {});
+}
+
+Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem::path& folder, const std::string& fallback_name,
+                                    const Progress& progress) {
+  ObjectReader root(json, "", "scene");
+  ASPERITY_CHECK(root.status());
+  std::string name;
+  read_heading(root, fallback_name, name);
+  ASPERITY_CHECK(root.status());
+  ASPERITY_TRY(ScenePart<DeviceProfile> device, read_device(root.raw("device"), "device"));
+  ASPERITY_TRY(ScenePart<HandImpedance> hand, read_hand(root.raw("hand"), "hand"));
+  SceneContext context{folder, device.value, progress, {}};
+  SceneJson surfaces;
+  ASPERITY_TRY(std::vector<Instance> instances, read_surfaces(root, context, surfaces));
+  const double stiffness = instances.front().material.stiffness;
+  ASPERITY_TRY(ScenePart<ProbeSettings> probe, read_probe(root.raw("probe"), "probe", device.value, stiffness));
+  const Box bounds = base_bounds(instances);
+  ASPERITY_TRY(ScenePart<StrokeSettings> stroke, read_stroke(root.raw("stroke"), "stroke", bounds, context));
+  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), probe.value.radius));
+  if (progress) progress("laying the stroke", 0.0);
+  Result<StrokePath> path = build_stroke(stroke.value, projector(scene));
+  if (!path) return std::move(path).error().at("stroke");
+
+  root.write("device", std::move(device.canonical));
+  root.write("hand", std::move(hand.canonical));
+  root.write("probe", std::move(probe.canonical));
+  root.write("surfaces", std::move(surfaces));
+  root.write("stroke", std::move(stroke.canonical));
+  Experiment experiment{name,
+                        std::move(scene),
+                        probe.value.dynamic ? ProbeKind::dynamic : ProbeKind::ideal,
+                        device.value,
+                        hand.value,
+                        probe.value.ideal,
+                        probe.value.simulated,
+                        probe.value.rate,
+                        std::move(stroke.value),
+                        std::move(*path),
+                        std::move(context.notes),
+                        root.canonical().dump(2, ' ', false, SceneJson::error_handler_t::replace)};
+  return experiment;
+}
+
+}  // namespace
+
+Result<Experiment> read_experiment(const std::filesystem::path& file, const Progress& progress) {
+  ASPERITY_TRY(const std::string text, read_text(file));
+  return parse_experiment(text, file.parent_path(), file.string(), progress);
+}
+
+Result<Experiment> parse_experiment(std::string_view json, const std::filesystem::path& folder, const std::string& name,
+                                    const Progress& progress) {
+  try {
+    ASPERITY_TRY(const SceneJson parsed, parse_scene_json(json, name));
+    Result<Experiment> experiment = build_experiment(parsed, folder, std::filesystem::path(name).stem().string(), progress);
+    if (!experiment) return std::move(experiment).error().in_file(name);
+    return experiment;
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::too_large, "needs more memory than there is", name, {}, "a smaller scene"};
+  } catch (const std::exception& failure) {
+    return Error{ErrorCode::bad_value, std::string("cannot be used: ") + failure.what(), name, {}, {}};
+  }
+}
+
+Result<Experiment> with_law(const Experiment& experiment, const Law& law) {
+  try {
+    std::vector<Instance> instances(experiment.scene.instances().begin(), experiment.scene.instances().end());
+    for (Instance& instance : instances) instance.law = law;
+    ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), experiment.scene.probe_radius()));
+    Experiment changed = experiment;
+    changed.scene = std::move(scene);
+    SceneJson json = SceneJson::parse(experiment.canonical_json);
+    for (SceneJson& surface : json["surfaces"]) surface["law"] = law_json(law);
+    changed.canonical_json = json.dump(2, ' ', false, SceneJson::error_handler_t::replace);
+    return changed;
+  } catch (const std::exception& failure) {
+    return Error{ErrorCode::bad_value, std::string("cannot be felt by another law: ") + failure.what(), {}, {}, {}};
+  }
+}
+
+}  // namespace asperity

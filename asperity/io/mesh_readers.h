@@ -1,0 +1,54 @@
+#pragma once
+// Private to asperity/io: the readers behind read_mesh(), and the text handling that they share.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "asperity/core/result.h"
+#include "asperity/geometry/mesh.h"
+
+namespace asperity::mesh_readers {
+
+/// More corners than any modeller writes; it bounds the time that triangulating one polygon can take.
+inline constexpr std::size_t most_corners = 1024;
+
+/// Errors of these functions carry no file name: read_mesh_bytes() fills it in. [build]
+Result<MeshSource> read_obj(std::string_view bytes);
+Result<MeshSource> read_ply(std::string_view bytes);
+Result<MeshSource> read_stl(std::string_view bytes);
+/// Whether the bytes are a binary STL of exactly the size that its triangle count asks for.
+bool is_exact_binary_stl(std::string_view bytes);
+
+/// Reads a decimal number, "nan" or "inf" that makes up the whole token. Too large becomes infinite, too small 0.
+bool parse_number(std::string_view token, double& value);
+/// Reads a decimal integer that makes up the whole token.
+bool parse_integer(std::string_view token, std::int64_t& value);
+
+inline bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
+}
+
+/// Takes the next word off the front of `line`; empty at its end.
+std::string_view take_word(std::string_view& line);
+
+/// Walks text by lines or by words and knows the line it is on.
+class TextCursor {
+ public:
+  explicit TextCursor(std::string_view text) : text_(text) {}
+  /// The next line without its end; false when there is none.
+  bool next_line(std::string_view& line);
+  /// The next word, across line ends; empty at the end of the text.
+  std::string_view next_word();
+  [[nodiscard]] std::size_t line() const { return line_; }
+  [[nodiscard]] std::string place() const { return "line " + std::to_string(line_); }
+  [[nodiscard]] std::size_t offset() const { return at_; }
+
+ private:
+  std::string_view text_;
+  std::size_t at_ = 0;
+  std::size_t line_ = 0;  ///< of what was taken last, from 1
+  std::size_t ends_passed_ = 0;
+};
+
+}  // namespace asperity::mesh_readers

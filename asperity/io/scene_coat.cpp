@@ -1,0 +1,413 @@
+// The coat of a surface in a scene file.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "asperity/field/mesostructure_generators.h"
+#include "asperity/io/image_io.h"
+#include "asperity/io/scene_reader.h"
+
+namespace asperity {
+namespace {
+
+const std::vector<std::string>& channel_names() {
+  static const std::vector<std::string> names{"automatic", "luminance", "red", "green", "blue", "alpha"};
+  return names;
+}
+
+/// What a JSON file beside a measured height image says of it (m).
+struct Sidecar {
+  std::string file;
+  int width = 0;
+  int height = 0;
+  double low = 0.0;
+  double high = 0.0;
+  Vec2 pixel = Vec2::Zero();
+};
+
+/// Heights from black to white (m), before magnifying.
+struct HeightScale {
+  double amplitude = 0.0;
+  double offset = 0.0;
+};
+
+class CoatReader {
+ public:
+  CoatReader(const SceneJson& json, const std::string& place, const TriangleMesh& mesh, SceneContext& context)
+      : reader_(json, place, "coat"), mesh_(mesh), context_(context) {}
+
+  Result<ScenePart<Coat>> read() {
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_CHECK(read_source());
+    read_mapping();
+    magnify_ = reader_.number("magnify", 1.0, Range::positive());
+    ASPERITY_CHECK(reader_.status());
+    read_heights_scale();
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_TRY(HeightMap heights, generated_ ? generated_heights() : image_heights());
+    ASPERITY_CHECK(check_amplitude(heights));
+    ASPERITY_TRY(const Vec2 tile, read_tile(heights));
+    ASPERITY_TRY(Mesostructure maps, with_normals(std::move(heights), tile));
+    CoatSettings settings{mapping_, repeat_};
+    Result<Coat> coat = Coat::build(mesh_, std::make_shared<const Mesostructure>(std::move(maps)), settings);
+    if (!coat) return std::move(coat).error().at(reader_.place());
+    return ScenePart<Coat>{std::move(*coat), std::move(reader_.canonical())};
+  }
+
+ private:
+  Status read_source() {
+    const SceneJson* map = reader_.raw("height_map");
+    if (map == nullptr) {
+      reader_.fail("height_map", "is missing", "an image file (PNG, JPEG) or an object with a generator");
+    } else if (map->is_object()) {
+      generated_ = true;
+      read_generator(*map);
+      reader_.refuse({"channel", "white_is", "height_range"}, "for a generated height map");
+    } else if (map->is_string()) {
+      return read_image_source(map->get_ref<const std::string&>());
+    } else {
+      reader_.fail_type("height_map", *map, "an image file (PNG, JPEG) or an object with a generator");
+    }
+    return reader_.status();
+  }
+
+  void read_generator(const SceneJson& json) {
+    ObjectReader generator(json, reader_.place_of("height_map"), "height generator");
+    const std::string kind = generator.text("generator", "");
+    if (!generator.failed()) {
+      Result<MesostructureKind> parsed = parse_mesostructure_kind(kind);
+      if (parsed) {
+        spec_.kind = *parsed;
+      } else {
+        generator.fail(std::move(parsed).error().at(generator.place_of("generator")));
+      }
+    }
+    spec_.size = generator.integer("size", 512, 2, 8192);
+    if (spec_.kind == MesostructureKind::serrated || spec_.kind == MesostructureKind::beams) {
+      spec_.count = generator.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
+    } else {
+      generator.refuse({"count"}, "by this generator");
+    }
+    if (spec_.kind == MesostructureKind::warts) {
+      spec_.seed = generator.seed("seed", spec_.seed);
+    } else {
+      generator.refuse({"seed"}, "by this generator");
+    }
+    reader_.take("height_map", std::move(generator));
+  }
+
+  Status read_image_source(const std::string& file) {
+    path_ = context_.resolve(file);
+    if (context_.progress) context_.progress("reading height map", 0.0);
+    Result<Image> image = read_image(path_);
+    if (!image) {
+      Error error = std::move(image).error().in_file(path_.string());
+      if (error.place.empty()) error.place = reader_.place_of("height_map");
+      return error;
+    }
+    image_ = std::move(*image);
+    reader_.write("height_map", path_.string());
+    static const std::vector<std::string> white{"high", "deep"};
+    channel_ = static_cast<Channel>(reader_.choice("channel", channel_names(), 0));
+    white_is_deep_ = reader_.choice("white_is", white, 0) == 1;
+    return read_sidecar();
+  }
+
+  Status read_sidecar() {
+    std::filesystem::path path = path_;
+    path.replace_extension(".json");
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) return success();
+    const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    Result<SceneJson> json = parse_scene_json(text, path.string());
+    // A file of that name need not be about heights at all.
+    if (!json || !json->is_object() || !json->contains("height_min_m") || !json->contains("height_max_m")) return success();
+    const auto number = [&](const SceneJson& value) { return value.is_number() ? value.get<double>() : std::nan(""); };
+    const auto member = [&](const char* key) { return json->contains(key) ? number((*json)[key]) : std::nan(""); };
+    Sidecar sidecar;
+    sidecar.file = path.filename().string();
+    sidecar.low = member("height_min_m");
+    sidecar.high = member("height_max_m");
+    const bool sizes = member("width") == image_.width && member("height") == image_.height;
+    const SceneJson pixel = json->contains("pixel_size_m") ? (*json)["pixel_size_m"] : SceneJson();
+    if (pixel.is_array() && pixel.size() == 2) sidecar.pixel = Vec2(number(pixel[0]), number(pixel[1]));
+    if (!sizes || !(sidecar.high >= sidecar.low) || !(sidecar.pixel.minCoeff() > 0.0) || !sidecar.pixel.allFinite()) {
+      return Error{ErrorCode::mismatch,
+                   fmt::format("does not describe the image beside it, which has {} x {} pixels", image_.width, image_.height),
+                   path.string(), {}, "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image"};
+    }
+    sidecar_ = sidecar;
+    return success();
+  }
+
+  void read_mapping() {
+    static const std::vector<std::string> mappings{"auto", "uv", "per_face", "triplanar"};
+    static const std::vector<std::string> wraps{"repeat", "clamp"};
+    static const std::vector<std::string> filters{"nearest", "bilinear", "bspline"};
+    switch (reader_.choice("mapping", mappings, 0)) {
+      case 1: mapping_ = Mapping::uv; break;
+      case 2: mapping_ = Mapping::per_face; break;
+      case 3: mapping_ = Mapping::triplanar; break;
+      default:
+        mapping_ = mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar;
+        if (!mesh_.has_uvs()) {
+          context_.note("coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": \"triplanar\")");
+        }
+    }
+    wrap_ = reader_.choice("wrap", wraps, 0) == 0 ? Wrap::repeat : Wrap::clamp;
+    reconstruction_ = static_cast<Reconstruction>(reader_.choice("filter", filters, 2));
+  }
+
+  /// A length, or a share of the mean edge, the papers' shorthand.
+  double read_height(double fallback) {
+    const SceneJson* value = reader_.raw("height");
+    const bool flat = generated_ && spec_.kind == MesostructureKind::flat;
+    const Range range = flat ? Range{} : Range::not_negative();
+    const std::string text = value != nullptr && value->is_string() ? value->get<std::string>() : std::string();
+    if (text.find('%') == std::string::npos) return reader_.quantity("height", Dimension::length, fallback, range);
+    Result<double> share = parse_quantity(text, Dimension::ratio);
+    if (!share || !range.holds(*share)) {
+      reader_.fail("height", fmt::format("\"{}\" is no share of the mean edge", text), "\"10%\", or a length of 0 or more (m, cm, mm, um, in)");
+      return fallback;
+    }
+    const double height = *share * mesh_.mean_edge();
+    reader_.write("height", height);
+    return height;
+  }
+
+  void read_heights_scale() {
+    if (const SceneJson* range = reader_.raw("height_range")) {
+      reader_.refuse({"height", "offset"}, "beside height_range");
+      read_range(*range);
+      return;
+    }
+    constexpr double papers_best = 0.1;  // hrm-2010, 5.3: the share of the edge that is perceived best
+    const bool flat = generated_ && spec_.kind == MesostructureKind::flat;
+    const bool from_sidecar = sidecar_ && !reader_.has("height") && !reader_.has("offset");
+    if (from_sidecar) {
+      scale_ = {sidecar_->high - sidecar_->low, white_is_deep_ ? sidecar_->high : sidecar_->low};
+      reader_.write("height", scale_.amplitude);
+      reader_.write("offset", scale_.offset);
+      context_.note(fmt::format("coat: heights {} to {} from {}", format_length(sidecar_->low), format_length(sidecar_->high), sidecar_->file));
+      return;
+    }
+    // `magnify` scales what the scene says; the default is a share of the mesh as it is.
+    const double fallback = flat ? 0.0 : papers_best * mesh_.mean_edge() / magnify_;
+    scale_.amplitude = read_height(fallback);
+    scale_.offset = reader_.quantity("offset", Dimension::length, 0.0);
+    if (!reader_.has("height") && !flat) {
+      context_.note(fmt::format("coat: no height is stated; 10 % of the mean edge is taken, {} (\"height\" chooses otherwise)", format_length(magnify_ * fallback)));
+    }
+  }
+
+  void read_range(const SceneJson& range) {
+    if (!range.is_array() || range.size() != 2) {
+      reader_.fail_type("height_range", range, "two lengths [lowest, highest]");
+      return;
+    }
+    double ends[2] = {0.0, 0.0};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const SceneJson wrapped = SceneJson{{"height", range[i]}};
+      ObjectReader end(wrapped, fmt::format("{}[{}]", reader_.place_of("height_range"), i), "coat");
+      ends[i] = end.quantity("height", Dimension::length, 0.0);
+      if (end.error()) {
+        Error error = *end.error();
+        error.place = end.place();
+        reader_.fail(std::move(error));
+      }
+    }
+    if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", "two lengths [lowest, highest]");
+    scale_ = {ends[1] - ends[0], white_is_deep_ ? ends[1] : ends[0]};
+    reader_.write("height_range", SceneJson::array({ends[0], ends[1]}));
+  }
+
+  Result<HeightMap> image_heights() {
+    const HeightMapSettings settings{magnify_ * scale_.amplitude, magnify_ * scale_.offset, white_is_deep_, wrap_, reconstruction_};
+    Result<HeightMap> heights = HeightMap::build(image_, channel_, settings);
+    if (!heights) {
+      Error error = std::move(heights).error().in_file(path_.string());
+      error.place = error.place.empty() ? reader_.place_of("height_map") : reader_.place_of(error.place);
+      if (error.code == ErrorCode::bad_value) error.code = ErrorCode::bad_map;
+      return error;
+    }
+    if (channel_ == Channel::automatic && !heights->channel().reason.empty()) {
+      context_.note(fmt::format("coat: heights are read from the {} channel ({})", to_string(heights->channel().channel), heights->channel().reason));
+    }
+    return heights;
+  }
+
+  Result<HeightMap> generated_heights() {
+    spec_.amplitude = magnify_ * scale_.amplitude;
+    Result<std::vector<float>> heights = generate_heights(spec_);
+    if (!heights) return std::move(heights).error().at(reader_.place_of("height_map"));
+    const double offset = magnify_ * scale_.offset;
+    if (offset != 0.0) {
+      for (float& height : *heights) height = static_cast<float>(static_cast<double>(height) + offset);
+    }
+    Result<HeightMap> map = HeightMap::build(std::move(*heights), spec_.size, spec_.size, wrap_, reconstruction_);
+    if (!map) return std::move(map).error().at(reader_.place());
+    return map;
+  }
+
+  Status check_amplitude(const HeightMap& heights) {
+    constexpr double remesh_share = 0.2;  // hrm-2010, 5.3: beyond it the rendering becomes unstable; from 15 % on: remesh
+    const double highest = std::max(std::abs(heights.lowest()), std::abs(heights.highest()));
+    const double half = 0.5 * mesh_.bounds().diagonal();
+    const char* key = reader_.has("height_range") ? "height_range" : (reader_.has("height") ? "height" : "height_map");
+    if (highest > half) {
+      return Error{ErrorCode::bad_value, fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest), format_length(2.0 * half)),
+                   {}, reader_.place_of(key), fmt::format("heights of at most half the diagonal ({})", format_length(half))};
+    }
+    const double range = heights.highest() - heights.lowest();
+    if (range > remesh_share * mesh_.mean_edge()) {
+      context_.note(fmt::format("coat: relief of {} is {:.0f} % of the mean edge ({}); hrm-2010 found instabilities beyond 20 % and suggests geometry instead beyond 15 %",
+                                format_length(range), 100.0 * range / mesh_.mean_edge(), format_length(mesh_.mean_edge())));
+    }
+    return success();
+  }
+
+  Result<Vec2> read_tile(const HeightMap& heights) {
+    const double aspect = static_cast<double>(heights.height()) / heights.width();
+    if (mapping_ != Mapping::triplanar) {
+      reader_.refuse({"tile"}, "by this mapping, whose size the mesh decides (\"repeat\" changes it)");
+      read_repeat();
+      ASPERITY_CHECK(reader_.status());
+      return mapped_tile();
+    }
+    reader_.refuse({"repeat"}, "by the triplanar mapping (\"tile\" is the size of one repeat)");
+    constexpr double share = 0.25;  // four repeats over the object
+    const SceneJson* given = reader_.raw("tile");
+    const bool pair = given != nullptr && given->is_array();
+    Vec2 tile = Vec2::Zero();
+    if (pair) {
+      tile = read_tile_pair(*given);
+    } else if (given == nullptr && sidecar_) {
+      tile = Vec2(sidecar_->pixel.x() * heights.width(), sidecar_->pixel.y() * heights.height());
+      reader_.write("tile", SceneJson::array({tile.x(), tile.y()}));
+      context_.note(fmt::format("coat: one repeat is {} x {} from {}", format_length(tile.x()), format_length(tile.y()), sidecar_->file));
+    } else {
+      const double fallback = share * mesh_.bounds().extent().maxCoeff() / magnify_;
+      const double width = reader_.quantity("tile", Dimension::length, fallback, Range::positive());
+      tile = Vec2(width, width * aspect);
+      if (given == nullptr) context_.note(fmt::format("coat: one repeat of the map is {} wide, a quarter of the object (\"tile\" chooses otherwise)", format_length(magnify_ * width)));
+    }
+    ASPERITY_CHECK(reader_.status());
+    return Vec2(magnify_ * tile);
+  }
+
+  Vec2 read_tile_pair(const SceneJson& given) {
+    if (given.size() != 2) {
+      reader_.fail("tile", fmt::format("has {} lengths", given.size()), "a length, or two [along s, along t]");
+      return Vec2::Ones();
+    }
+    Vec2 tile = Vec2::Ones();
+    for (std::size_t i = 0; i < 2; ++i) {
+      const SceneJson wrapped = SceneJson{{"tile", given[i]}};
+      ObjectReader one(wrapped, fmt::format("{}[{}]", reader_.place_of("tile"), i), "coat");
+      tile[static_cast<int>(i)] = one.quantity("tile", Dimension::length, 1.0, Range::positive());
+      if (one.error()) {
+        Error error = *one.error();
+        error.place = one.place();
+        reader_.fail(std::move(error));
+      }
+    }
+    reader_.write("tile", SceneJson::array({tile.x(), tile.y()}));
+    return tile;
+  }
+
+  void read_repeat() {
+    const SceneJson* given = reader_.raw("repeat");
+    if (given != nullptr && given->is_array()) {
+      for (std::size_t i = 0; i < 2 && given->size() == 2; ++i) {
+        if (!(*given)[i].is_number() || !((*given)[i].get<double>() > 0.0)) {
+          reader_.fail("repeat", "is no pair of numbers above 0", "a number above 0, or two [along s, along t]");
+          return;
+        }
+        repeat_[static_cast<int>(i)] = (*given)[i].get<double>();
+      }
+      if (given->size() != 2) reader_.fail("repeat", fmt::format("has {} numbers", given->size()), "a number above 0, or two [along s, along t]");
+      reader_.write("repeat", *given);
+      return;
+    }
+    const double repeat = reader_.number("repeat", 1.0, Range::positive());
+    repeat_ = Vec2(repeat, repeat);
+  }
+
+  /// Mean size of one repeat as the mesh carries it (m).
+  [[nodiscard]] Vec2 mapped_tile() const {
+    if (mapping_ == Mapping::per_face) return Vec2(mesh_.mean_edge() / repeat_.x(), mesh_.mean_edge() / repeat_.y());
+    double area = 0.0;
+    for (std::uint32_t face = 0; mesh_.has_uvs() && face < mesh_.triangles().size(); ++face) {
+      const auto& uv = mesh_.uvs(face);
+      const Vec2f a = uv[1] - uv[0];
+      const Vec2f b = uv[2] - uv[0];
+      area += 0.5 * std::abs(static_cast<double>(a.x()) * static_cast<double>(b.y()) - static_cast<double>(a.y()) * static_cast<double>(b.x()));
+    }
+    const double side = area > 0.0 ? std::sqrt(mesh_.report().area / area) : mesh_.mean_edge();
+    return {side / repeat_.x(), side / repeat_.y()};
+  }
+
+  Result<Mesostructure> with_normals(HeightMap heights, const Vec2& tile) {
+    static const std::vector<std::string> greens{"up", "down"};
+    const SceneJson* file = reader_.raw("normal_map");
+    if (file == nullptr) {
+      reader_.refuse({"green"}, "without normal_map");
+      ASPERITY_CHECK(reader_.status());
+      return Mesostructure::build(std::move(heights), tile);
+    }
+    const std::string name = reader_.text("normal_map", "");
+    const auto green = static_cast<GreenConvention>(reader_.choice("green", greens, 0));
+    ASPERITY_CHECK(reader_.status());
+    const std::filesystem::path path = context_.resolve(name);
+    reader_.write("normal_map", path.string());
+    if (context_.progress) context_.progress("reading normal map", 0.0);
+    Result<Image> image = read_image(path);
+    if (!image) {
+      Error error = std::move(image).error().in_file(path.string());
+      if (error.place.empty()) error.place = reader_.place_of("normal_map");
+      return error;
+    }
+    Result<NormalMap> normals = NormalMap::build(*image, {green, wrap_, NormalFilter::bilinear});
+    if (!normals) {
+      Error error = std::move(normals).error().in_file(path.string()).at(reader_.place_of("normal_map"));
+      error.code = ErrorCode::bad_map;
+      return error;
+    }
+    const NormalAgreement agreement = compare_normals(heights, *normals, tile);
+    if (const auto warning = disagreement_warning(agreement)) context_.note("coat: " + *warning);
+    if (normals->degenerate_texels() > 0) {
+      context_.note(fmt::format("coat: {} texels of the normal map are no direction and count as flat", normals->degenerate_texels()));
+    }
+    return Mesostructure::build(std::move(heights), std::move(*normals), tile);
+  }
+
+  ObjectReader reader_;
+  const TriangleMesh& mesh_;
+  SceneContext& context_;
+  bool generated_ = false;
+  MesostructureSpec spec_;
+  std::filesystem::path path_;
+  Image image_;
+  Channel channel_ = Channel::automatic;
+  bool white_is_deep_ = false;
+  std::optional<Sidecar> sidecar_;
+  Mapping mapping_ = Mapping::uv;
+  Wrap wrap_ = Wrap::repeat;
+  Reconstruction reconstruction_ = Reconstruction::quadratic_bspline;
+  double magnify_ = 1.0;
+  HeightScale scale_;
+  Vec2 repeat_ = Vec2::Ones();
+};
+
+}  // namespace
+
+Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
+                                  SceneContext& context) {
+  return CoatReader(json, place, mesh, context).read();
+}
+
+}  // namespace asperity

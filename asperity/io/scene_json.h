@@ -1,0 +1,102 @@
+#pragma once
+// Scene files are read through this: every key is asked for with its type, range and default, what was decided is written
+// into a canonical copy, and the first thing that is wrong is kept as the error. Internal to io.
+
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "asperity/core/math.h"
+#include "asperity/core/result.h"
+#include "asperity/core/units.h"
+
+namespace asperity {
+
+using SceneJson = nlohmann::ordered_json;
+
+/// Parses JSON text of at most 16 MiB. Errors: file_empty, file_malformed with "line 3, column 7" as place (a syntax
+/// error, or a key given twice), too_large. [build]
+Result<SceneJson> parse_scene_json(std::string_view text, const std::string& name);
+
+/// "a string", "an object": a JSON type as messages say it. [any]
+const char* json_type(const SceneJson& value);
+
+/// The kinds of object that a scene file may hold, and the keys of each; the published schema describes the same ones.
+struct SceneObjectKeys {
+  std::string_view object;  ///< "scene", "surface", "coat": the name of its definition in the schema
+  std::vector<std::string> keys;
+};
+const std::vector<SceneObjectKeys>& scene_object_keys();
+
+/// Interval that a number has to lie in.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool above_low = false;  ///< `low` itself is not allowed
+
+  static constexpr Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
+  static constexpr Range not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
+  [[nodiscard]] bool holds(double value) const { return value <= high && (above_low ? value > low : value >= low); }
+  /// "above 0", "0 to 0.333", "of any size"
+  [[nodiscard]] std::string text() const;
+};
+
+/// Reads one JSON object. Getters answer the fallback once something is wrong; `finish` then tells what. [build]
+class ObjectReader {
+ public:
+  /// `object` names an entry of scene_object_keys(). A `json` that is no object, and an unknown key, are errors.
+  ObjectReader(const SceneJson& json, std::string place, std::string_view object);
+
+  [[nodiscard]] bool has(std::string_view key) const { return json_->is_object() && json_->contains(key); }
+  [[nodiscard]] const std::string& place() const { return place_; }
+  [[nodiscard]] std::string place_of(std::string_view key) const;
+  [[nodiscard]] bool failed() const { return error_.has_value(); }
+
+  /// A number (SI) or a text with a unit.
+  double quantity(std::string_view key, Dimension dimension, double fallback, const Range& range = {});
+  /// The same without a fallback: nothing when the key is absent.
+  std::optional<double> optional_quantity(std::string_view key, Dimension dimension, const Range& range = {});
+  double number(std::string_view key, double fallback, const Range& range = {});
+  int integer(std::string_view key, int fallback, int low, int high);
+  std::uint64_t seed(std::string_view key, std::uint64_t fallback);
+  bool boolean(std::string_view key, bool fallback);
+  std::string text(std::string_view key, std::string fallback);
+  /// One of `names`; answers its position, `fallback` when the key is absent.
+  std::size_t choice(std::string_view key, std::span<const std::string> names, std::size_t fallback);
+  /// Three lengths (m, or texts with units).
+  Vec3 lengths(std::string_view key, const Vec3& fallback);
+  /// Three plain numbers.
+  Vec3 direction(std::string_view key, const Vec3& fallback);
+  /// The value as it stands, or nullptr.
+  [[nodiscard]] const SceneJson* raw(std::string_view key) const;
+
+  /// Writes the value that was decided for `key` into the canonical copy.
+  void write(std::string_view key, SceneJson value) { canonical_[std::string(key)] = std::move(value); }
+  /// Keeps the first error only.
+  void fail(std::string_view key, std::string what, std::string accepted, ErrorCode code = ErrorCode::bad_value);
+  void fail(Error error);
+  void fail_type(std::string_view key, const SceneJson& value, std::string accepted);
+  /// Refuses `keys` where they would be read by nobody; `why` completes "is not read ...".
+  void refuse(std::initializer_list<std::string_view> keys, const std::string& why);
+  /// A sub-object that was read: its error, or its canonical copy under `key`.
+  void take(std::string_view key, ObjectReader&& child);
+
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  [[nodiscard]] Status status() const { return error_ ? Status(*error_) : success(); }
+  [[nodiscard]] SceneJson& canonical() { return canonical_; }
+
+ private:
+  double value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range);
+
+  const SceneJson* json_;
+  std::string place_;
+  std::optional<Error> error_;
+  SceneJson canonical_ = SceneJson::object();
+};
+
+}  // namespace asperity

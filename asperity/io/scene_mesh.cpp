@@ -1,0 +1,274 @@
+// The mesh of a surface in a scene file: from a file or a generator, scaled, placed, turned up.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "asperity/geometry/generators.h"
+#include "asperity/io/mesh_io.h"
+#include "asperity/io/scene_reader.h"
+
+namespace asperity {
+namespace {
+
+const std::vector<std::string>& generator_names() {
+  static const std::vector<std::string> names{"icosphere", "M_a", "M_b", "M_c", "M_e", "M_f", "plane", "box", "random"};
+  return names;
+}
+
+struct Unit {
+  const char* name;
+  double metres;
+};
+constexpr Unit units[] = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}, {"in", 0.0254}};
+
+const std::vector<std::string>& axis_names() {
+  static const std::vector<std::string> names{"x", "y", "z", "-x", "-y", "-z"};
+  return names;
+}
+
+/// Turns the named axis to +y, by signs and swaps alone, so that planes stay exactly plane.
+Vec3 turned_up(const Vec3& p, std::size_t axis) {
+  switch (axis) {
+    case 0: return {-p.y(), p.x(), p.z()};
+    case 2: return {p.x(), p.z(), -p.y()};
+    case 3: return {p.y(), -p.x(), p.z()};
+    case 4: return {p.x(), -p.y(), -p.z()};
+    case 5: return {p.x(), -p.z(), p.y()};
+    default: return p;
+  }
+}
+
+/// Reads one generator's parameters; every one that it does not take is refused by name.
+class GeneratorReader {
+ public:
+  explicit GeneratorReader(ObjectReader& reader) : reader_(reader) {}
+
+  MeshSource generate(std::size_t generator) {
+    switch (generator) {
+      case 0: return icosphere_source();
+      case 1: return flat(&trial_mesh_a);
+      case 2: return trial_b();
+      case 3: return flat(&trial_mesh_c);
+      case 4: return cup();
+      case 5: return strip();
+      case 6: return plane();
+      case 7: return box();
+      default: return blob();
+    }
+  }
+
+ private:
+  double length(const char* key, double fallback) {
+    return reader_.quantity(key, Dimension::length, fallback, Range{1e-9, 1e9});
+  }
+  void only(std::initializer_list<std::string_view> taken) {
+    for (const SceneObjectKeys& entry : scene_object_keys()) {
+      if (entry.object != "mesh generator") continue;
+      for (const std::string& key : entry.keys) {
+        if (key != "generator" && std::find(taken.begin(), taken.end(), key) == taken.end()) {
+          reader_.refuse({key}, "by this generator");
+        }
+      }
+    }
+  }
+
+  MeshSource icosphere_source() {
+    only({"subdivisions", "radius", "mean_edge"});
+    const int subdivisions = reader_.integer("subdivisions", 4, 0, 9);
+    if (reader_.has("radius") && reader_.has("mean_edge")) reader_.fail("mean_edge", "is given beside radius", "one of the two");
+    if (!reader_.has("mean_edge")) return make([&] { return icosphere(subdivisions, length("radius", 0.04)); });
+    const double edge = length("mean_edge", 0.01);
+    return make([&] { return icosphere(subdivisions, icosphere_radius_for_edge(subdivisions, edge)); });
+  }
+
+  TrialMeshSettings trial_settings() {
+    TrialMeshSettings settings;
+    settings.columns = reader_.integer("columns", settings.columns, 1, 1000);
+    settings.rows = reader_.integer("rows", settings.rows, 1, 1000);
+    settings.mean_edge = length("mean_edge", settings.mean_edge);
+    return settings;
+  }
+  MeshSource flat(MeshSource (*generator)(const TrialMeshSettings&)) {
+    only({"columns", "rows", "mean_edge"});
+    const TrialMeshSettings settings = trial_settings();
+    return make([&] { return generator(settings); });
+  }
+  MeshSource trial_b() {
+    only({"columns", "rows", "mean_edge", "largest_fold"});
+    const TrialMeshSettings settings = trial_settings();
+    const double fold = reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0, Range{1e-3, std::numbers::pi / 4.0});
+    return make([&] { return trial_mesh_b(fold, settings); });
+  }
+  MeshSource cup() {
+    only({"rings", "opening", "mean_edge"});
+    const int rings = reader_.integer("rings", 8, 1, 512);
+    const double opening = reader_.quantity("opening", Dimension::angle, std::numbers::pi / 2.0, Range{0.1, 3.0});
+    const double edge = length("mean_edge", 0.01);
+    return make([&] { return trial_mesh_e(rings, opening, edge); });
+  }
+  MeshSource strip() {
+    only({"triangles", "mean_edge"});
+    const int triangles = reader_.integer("triangles", 10, 1, 40);
+    const double edge = length("mean_edge", 0.01);
+    return make([&] { return trial_mesh_f(triangles, edge); });
+  }
+  MeshSource plane() {
+    only({"width", "depth", "columns", "rows", "triangles"});
+    const double width = length("width", 0.1);
+    const double depth = length("depth", 0.1);
+    if (reader_.has("triangles")) {
+      reader_.refuse({"columns", "rows"}, "beside triangles");
+      const int triangles = reader_.integer("triangles", 2, 2, 4'194'304);
+      return make([&] { return plane_grid(width, depth, static_cast<std::uint32_t>(triangles)); });
+    }
+    const int columns = reader_.integer("columns", 1, 1, 2048);
+    const int rows = reader_.integer("rows", 1, 1, 2048);
+    return make([&] { return plane_grid(width, depth, columns, rows); });
+  }
+  MeshSource box() {
+    only({"size"});
+    const Vec3 size = reader_.lengths("size", Vec3(0.08, 0.08, 0.08));
+    if (!(size.minCoeff() >= 1e-9 && size.maxCoeff() <= 1e9)) reader_.fail("size", "is no box", "three lengths above 0 (m, or with a unit)");
+    return make([&] { return box_mesh(size); });
+  }
+  MeshSource blob() {
+    only({"seed", "subdivisions", "radius", "roughness"});
+    const std::uint64_t seed = reader_.seed("seed", 1);
+    const int subdivisions = reader_.integer("subdivisions", 4, 0, 8);
+    const double radius = length("radius", 0.04);
+    const double roughness = reader_.number("roughness", 0.2, Range{0.0, 0.9});
+    return make([&] { return random_closed_mesh(seed, subdivisions, radius, roughness); });
+  }
+
+  /// Nothing is generated from parameters that were refused.
+  template <class Make>
+  MeshSource make(Make&& generate_mesh) {
+    return reader_.failed() ? MeshSource{} : generate_mesh();
+  }
+
+  ObjectReader& reader_;
+};
+
+Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface) {
+  ObjectReader reader(json, surface.place_of("mesh"), "mesh generator");
+  if (!reader.failed() && !reader.has("generator")) reader.fail("generator", "is missing", "a generator's name");
+  const std::size_t generator = reader.choice("generator", generator_names(), 0);
+  ASPERITY_CHECK(reader.status());
+  MeshPart part;
+  part.source = GeneratorReader(reader).generate(generator);
+  part.name = generator_names()[generator];
+  ASPERITY_CHECK(reader.status());
+  surface.take("mesh", std::move(reader));
+  return part;
+}
+
+Result<MeshPart> from_file(const std::string& file, ObjectReader& surface, SceneContext& context) {
+  const std::filesystem::path path = context.resolve(file);
+  if (context.progress) context.progress("reading mesh", 0.0);
+  Result<MeshSource> source = read_mesh(path);
+  if (!source) {
+    Error error = std::move(source).error().in_file(path.string());
+    if (error.place.empty()) error.place = surface.place_of("mesh");
+    return error;
+  }
+  MeshPart part;
+  part.source = std::move(*source);
+  part.name = path.stem().string();
+  part.from_file = true;
+  surface.write("mesh", path.string());
+  return part;
+}
+
+/// Bounds of the vertices that triangles use and that are finite; the builder reports the others.
+Box used_bounds(const MeshSource& source) {
+  Box bounds;
+  for (const auto& triangle : source.triangles) {
+    for (const std::uint32_t corner : triangle) {
+      if (corner < source.positions.size() && source.positions[corner].allFinite()) bounds.include(source.positions[corner]);
+    }
+  }
+  return bounds;
+}
+
+double read_units(ObjectReader& surface, bool from_file) {
+  static const std::vector<std::string> names{"m", "cm", "mm", "um", "in"};
+  if (!from_file) {
+    surface.refuse({"units"}, "for a generated mesh, which is in metres");
+    return 1.0;
+  }
+  return units[surface.choice("units", names, 0)].metres;
+}
+
+/// The largest extent that `fit` asks for (m); 0: as it is.
+double read_fit(ObjectReader& surface, bool by_default, const SceneContext& context) {
+  const double workspace = context.device.workspace_radius;
+  const SceneJson* fit = surface.raw("fit");
+  if (fit == nullptr) {
+    surface.write("fit", by_default ? "workspace" : "none");
+    return by_default ? workspace : 0.0;
+  }
+  if (fit->is_string() && (*fit == "workspace" || *fit == "none")) {
+    surface.write("fit", *fit);
+    return *fit == "workspace" ? workspace : 0.0;
+  }
+  if (!fit->is_number() && !fit->is_string()) {
+    surface.fail_type("fit", *fit, "\"workspace\", \"none\", or a length above 0");
+    return 0.0;
+  }
+  if (fit->is_string() && !parse_quantity(fit->get_ref<const std::string&>(), Dimension::length)) {
+    surface.fail("fit", fmt::format("\"{}\" is not known", fit->get_ref<const std::string&>()),
+                 "\"workspace\", \"none\", or a length above 0 (" + accepted_units(Dimension::length) + ")");
+    return 0.0;
+  }
+  return surface.quantity("fit", Dimension::length, 0.0, Range::positive());
+}
+
+void note_fit(const MeshPart& part, const Vec3& extent, double scale, const SceneContext& context, std::string& note) {
+  note = fmt::format("mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace radius of {} "
+                     "(\"units\" or \"fit\" choose otherwise)",
+                     part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
+                     format_length(scale * extent.z()), context.device.name);
+}
+
+}  // namespace
+
+Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
+  const SceneJson* mesh = surface.raw("mesh");
+  if (mesh == nullptr) {
+    surface.fail("mesh", "is missing", "a mesh file (OBJ, PLY, STL) or an object with a generator");
+    return *surface.error();
+  }
+  if (!mesh->is_string() && !mesh->is_object()) {
+    surface.fail_type("mesh", *mesh, "a mesh file (OBJ, PLY, STL) or an object with a generator");
+    return *surface.error();
+  }
+  ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface)
+                                                : from_file(mesh->get_ref<const std::string&>(), surface, context));
+  const bool stated = surface.has("units") || surface.has("fit");
+  const double unit = read_units(surface, part.from_file);
+  const double size = read_fit(surface, part.from_file && !stated, context);
+  // Generators lay open sheets in z = 0 with their touched side towards +z.
+  const bool flat = !part.from_file && part.name != "icosphere" && part.name != "box" && part.name != "random";
+  const std::size_t up = surface.choice("up", axis_names(), flat ? 2 : 1);
+  ASPERITY_CHECK(surface.status());
+
+  const Box bounds = used_bounds(part.source);
+  const double largest = bounds.empty() ? 0.0 : unit * bounds.extent().maxCoeff();
+  const bool fitted = size > 0.0 && largest > 0.0;
+  const double scale = fitted ? size / largest : 1.0;
+  const Vec3 centre = fitted ? bounds.centre() : Vec3(Vec3::Zero());
+  for (Vec3& p : part.source.positions) p = turned_up((p - centre) * (unit * scale), up);
+  if (fitted && part.from_file && !stated) {
+    std::string note;
+    note_fit(part, unit * bounds.extent(), scale, context, note);
+    context.note(std::move(note));
+  }
+  for (const std::string& note : part.source.notes) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
+  part.source.notes.clear();
+  return part;
+}
+
+}  // namespace asperity

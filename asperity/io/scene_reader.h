@@ -1,0 +1,79 @@
+#pragma once
+// The parts of a scene file, one function each. Internal to io: experiment.cpp puts them together.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "asperity/core/progress.h"
+#include "asperity/device/hand.h"
+#include "asperity/device/ideal_probe.h"
+#include "asperity/device/profile.h"
+#include "asperity/device/simulated_device.h"
+#include "asperity/device/stroke.h"
+#include "asperity/io/scene_json.h"
+#include "asperity/render/scene.h"
+
+namespace asperity {
+
+/// What the parts of a scene need to know of one another.
+struct SceneContext {
+  std::filesystem::path folder;  ///< what relative paths start from
+  DeviceProfile device;
+  Progress progress;
+  std::vector<std::string> notes;
+
+  void note(std::string text) { notes.push_back(std::move(text)); }
+  /// `name` as an absolute path, relative ones from `folder`.
+  [[nodiscard]] std::filesystem::path resolve(const std::string& name) const;
+};
+
+/// What was read, and how it stands in the canonical copy.
+template <class T>
+struct ScenePart {
+  T value;
+  SceneJson canonical;
+};
+
+/// Text (a built-in profile) or object (a profile with changes). `json` may be nullptr: phantom-desktop. [build]
+Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::string& place);
+/// Text (a preset) or object. [build]
+Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::string& place);
+
+struct ProbeSettings {
+  bool dynamic = false;
+  double radius = 0.0;  ///< m
+  double rate = 1000.0; ///< Hz
+  IdealProbeSettings ideal;
+  SimulatedDeviceSettings simulated;
+};
+/// `stiffness`: of what is touched (N/m), the default estimate of the ideal probe's regulator. [build]
+Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place, const DeviceProfile& device,
+                                            double stiffness);
+
+/// Text (a law's name) or object. [build]
+Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place, const SceneContext& context);
+/// A law as scene files write it; reads back as the same law. A blend map is written as its values. [build]
+SceneJson law_json(const Law& law);
+
+/// A mesh before it is built: placed, scaled, its axis turned up. [build]
+struct MeshPart {
+  MeshSource source;     ///< m
+  std::string name;      ///< what the surface is called unless the scene says otherwise
+  bool from_file = false;
+};
+/// Reads `mesh`, `units`, `fit` and `up` of a surface. Sets an error in `surface` or answers one. [build]
+Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context);
+
+/// A coat for `mesh`. [build]
+Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
+                                  SceneContext& context);
+
+/// One entry of `surfaces`. [build]
+Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context);
+
+/// `bounds`: of the base meshes (m, world), for defaults and percentages. [build]
+Result<ScenePart<StrokeSettings>> read_stroke(const SceneJson* json, const std::string& place, const Box& bounds,
+                                              const SceneContext& context);
+
+}  // namespace asperity

@@ -1,0 +1,125 @@
+// One surface of a scene file: mesh, coat, law, material, place.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/io/scene_reader.h"
+
+namespace asperity {
+namespace {
+
+constexpr double preferred_stiffness = 1000.0;  // N/m: the papers' 1 N/mm
+
+Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
+  static const SceneJson empty = SceneJson::object();
+  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("pose"), "pose");
+  Pose pose;
+  pose.position = reader.lengths("position", Vec3::Zero());
+  if (const SceneJson* q = reader.raw("orientation")) {
+    reader.refuse({"axis", "angle"}, "beside orientation");
+    const bool numbers = q->is_array() && q->size() == 4 && std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
+    if (!numbers) {
+      reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
+    } else {
+      pose.orientation = Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
+      const double norm = pose.orientation.norm();
+      if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
+      // Written and read again, an orientation keeps its bits.
+      if (std::abs(norm - 1.0) > 1e-12) pose.orientation.normalize();
+    }
+  } else if (reader.has("angle") || reader.has("axis")) {
+    const Vec3 axis = reader.direction("axis", Vec3::UnitY());
+    const double angle = reader.quantity("angle", Dimension::angle, 0.0);
+    if (!reader.failed()) pose.orientation = Quat(Eigen::AngleAxisd(angle, axis.normalized()));
+  }
+  ASPERITY_CHECK(reader.status());
+  const Quat& q = pose.orientation;
+  SceneJson canonical = SceneJson::object();
+  canonical["position"] = {pose.position.x(), pose.position.y(), pose.position.z()};
+  canonical["orientation"] = {q.w(), q.x(), q.y(), q.z()};
+  surface.write("pose", std::move(canonical));
+  return pose;
+}
+
+Result<Material> read_material(const SceneJson* json, ObjectReader& surface, SceneContext& context) {
+  static const SceneJson empty = SceneJson::object();
+  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("material"), "material");
+  const DeviceProfile& device = context.device;
+  Material material;
+  material.stiffness = reader.quantity("stiffness", Dimension::stiffness, std::min(preferred_stiffness, device.max_stiffness), Range::positive());
+  material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
+  ASPERITY_CHECK(reader.status());
+  if (material.stiffness > device.max_stiffness) {
+    context.note(fmt::format("material: a stiffness of {:g} N/m is more than the {:g} N/m that {} renders without buzzing", material.stiffness,
+                             device.max_stiffness, device.name));
+  }
+  surface.take("material", std::move(reader));
+  return material;
+}
+
+Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& context, const std::string& name) {
+  static const std::vector<std::string> names{"auto", "front", "both"};
+  switch (surface.choice("sides", names, 0)) {
+    case 1: return Sides::front;
+    case 2: return Sides::both;
+    default: break;
+  }
+  const Sides sides = mesh.natural_sides();
+  if (sides == Sides::both) {
+    context.note(fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" chooses otherwise)", name));
+  }
+  return sides;
+}
+
+Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context) {
+  const SceneJson* key = surface.raw("mesh");
+  Result<TriangleMesh> mesh = TriangleMesh::build(std::move(part.source));
+  if (!mesh) {
+    Error error = std::move(mesh).error();
+    if (part.from_file) error = std::move(error).in_file(context.resolve(key->get<std::string>()).string());
+    if (error.place.empty()) error.place = surface.place_of("mesh");
+    return error;
+  }
+  for (const std::string& note : mesh->notes()) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
+  return mesh;
+}
+
+}  // namespace
+
+Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context) {
+  static const std::vector<std::string> searches{"bvh", "octree"};
+  ObjectReader reader(json, place, "surface");
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(MeshPart part, read_mesh_part(reader, context));
+  Instance instance;
+  instance.name = reader.text("name", part.name);
+  const auto search = reader.choice("search", searches, 0) == 0 ? SearchStructure::bvh : SearchStructure::octree;
+  ASPERITY_CHECK(reader.status());
+  if (context.progress) context.progress("building the search structure", 0.0);
+  ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), reader, context));
+  MeshSurface base(TriangleIndex::build(std::move(mesh), search));
+  instance.sides = read_sides(reader, base, context, instance.name);
+  ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
+  ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
+  const SceneJson* coat_json = reader.raw("coat");
+  instance.law = coat_json == nullptr ? Law(GodObjectLaw{}) : Law(MesostructureLaw{});
+  reader.write("law", law_json(instance.law));
+  if (const SceneJson* law = reader.raw("law")) {
+    ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));
+    instance.law = std::move(read.value);
+    reader.write("law", std::move(read.canonical));
+  }
+  if (coat_json == nullptr) {
+    instance.surface = std::make_shared<const MeshSurface>(std::move(base));
+  } else {
+    ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
+    reader.write("coat", std::move(coat.canonical));
+    instance.surface = std::make_shared<const ReliefSurface>(std::move(base), std::move(coat.value));
+  }
+  ASPERITY_CHECK(reader.status());
+  return ScenePart<Instance>{std::move(instance), std::move(reader.canonical())};
+}
+
+}  // namespace asperity

@@ -1,0 +1,66 @@
+#pragma once
+// The immutable snapshot that the servo thread reads: what is touched, how it is felt, what it is made of.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "asperity/core/frames.h"
+#include "asperity/core/result.h"
+#include "asperity/material/material.h"
+#include "asperity/render/laws.h"
+#include "asperity/surface/mesh_surface.h"
+#include "asperity/surface/relief_surface.h"
+
+namespace asperity {
+
+/// The closed set of providers. Shared, because snapshots that follow one another share what did not change.
+using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr<const ReliefSurface>>;
+
+/// "mesh", "relief": the provider's name in messages. [any]
+const char* surface_kind(const Surface& surface);
+/// Bounds in the object frame (m). [any]
+Box surface_bounds(const Surface& surface);
+/// The mesh that carries the surface. [any]
+const TriangleMesh& base_mesh(const Surface& surface);
+
+/// One touchable thing: a surface at a place, felt by a law, of a material.
+struct Instance {
+  std::string name;
+  Surface surface;
+  Law law = GodObjectLaw{};
+  Material material;
+  Sides sides = Sides::both;
+  Pose world_from_object;
+};
+
+/// Validated and immutable: `step` cannot fail on it. Copies share the surfaces.
+class Scene {
+ public:
+  /// Validates everything. Errors: unsupported_pair (a law that needs a coat on a bare mesh), bad_value (material, law
+  /// option, probe radius, pose not finite), each with the instance's place. [build]
+  static Result<Scene> build(std::vector<Instance> instances, double probe_radius);
+
+  [[nodiscard]] std::span<const Instance> instances() const noexcept { return instances_; }
+  /// Radius of the probe's tip (m); 0 is a point. [servo]
+  [[nodiscard]] double probe_radius() const noexcept { return probe_radius_; }
+  /// Tells snapshots apart, never 0. A state made for another one re-acquires its contacts. [servo]
+  [[nodiscard]] std::uint64_t epoch() const noexcept { return epoch_; }
+  /// World bounds of instance `index`, coat included (m). [servo]
+  [[nodiscard]] const Box& world_bounds(std::size_t index) const noexcept { return bounds_[index]; }
+  [[nodiscard]] Box world_bounds() const noexcept;
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+
+ private:
+  Scene() = default;
+
+  std::vector<Instance> instances_;
+  std::vector<Box> bounds_;
+  double probe_radius_ = 0.0;
+  std::uint64_t epoch_ = 0;
+};
+
+}  // namespace asperity

@@ -1,0 +1,279 @@
+#include "asperity/study/metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace asperity {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double bins_per_decade = 10.0;
+constexpr double fastest_bin = 1e-8;  // s; the histogram's first edge at the lowest
+
+bool in_contact(const TraceRecord& tick) { return tick.rendered.flags.has(TickFlag::contact); }
+
+TickMetrics measure_ticks(std::span<const TraceRecord> records, const RunSeries& series) {
+  TickMetrics m;
+  m.ticks = records.size();
+  for (const TraceRecord& tick : records) {
+    m.contact += in_contact(tick) ? 1U : 0U;
+    m.duration += tick.dt.count();
+    for (std::size_t bit = 0; bit < m.flags.size(); ++bit) m.flags[bit] += (tick.rendered.flags.bits() >> bit) & 1u;
+    const Vec3 change = tick.commanded - tick.rendered.wrench.force;
+    if (change.isZero(0.0)) continue;
+    ++m.safety_interventions;
+    m.largest_intervention = std::max(m.largest_intervention, change.norm());
+  }
+  m.rate = m.duration > 0.0 ? static_cast<double>(m.ticks) / m.duration : 0.0;
+  for (const double distance : series.distance) {
+    if (std::isfinite(distance)) m.length = std::max(m.length, distance);
+  }
+  return m;
+}
+
+ForceMetrics measure_force(std::span<const TraceRecord> records, const RunSeries& series) {
+  ForceMetrics m;
+  m.jump_distance = nan;
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const double jump = i > 0 ? (records[i].commanded - records[i - 1].commanded).norm() : 0.0;
+    if (jump > m.largest_jump) {
+      m.largest_jump = jump;
+      m.jump_tick = records[i].tick;
+      m.jump_distance = series.distance[i];
+    }
+    if (!in_contact(records[i])) continue;
+    count += 1.0;
+    m.mean += series.force[i];
+    m.mean_normal += series.normal[i];
+    m.max = std::max(m.max, series.force[i]);
+    squares += series.force[i] * series.force[i];
+  }
+  if (count == 0.0) return m;
+  m.mean /= count;
+  m.mean_normal /= count;
+  m.rms = std::sqrt(squares / count);
+  return m;
+}
+
+DirectionMetrics measure_direction(const RunSeries& series) {
+  std::vector<double> angles;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (series.stroking[i] && std::isfinite(series.direction_error[i])) angles.push_back(series.direction_error[i]);
+  }
+  DirectionMetrics m;
+  m.samples = angles.size();
+  if (angles.empty()) return m;
+  for (const double angle : angles) m.mean += angle;
+  m.mean /= static_cast<double>(angles.size());
+  m.p99 = percentile(angles, 0.99);
+  m.max = percentile(angles, 1.0);
+  return m;
+}
+
+/// Highest minus lowest of the values it has seen; 0 for none.
+struct Range {
+  double low = infinity;
+  double high = -infinity;
+  void include(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  [[nodiscard]] double size() const { return high >= low ? high - low : 0.0; }
+};
+
+HeightMetrics measure_height(const RunSeries& series) {
+  HeightMetrics m;
+  Range followed;
+  Range relief;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (!series.stroking[i] || !std::isfinite(series.followed[i])) continue;
+    followed.include(series.followed[i]);
+    relief.include(series.relief[i]);
+    if (series.near_step[i]) {
+      ++m.excluded;
+      continue;
+    }
+    const double error = series.followed[i] - series.relief[i];
+    ++m.samples;
+    squares += error * error;
+    m.max_error = std::max(m.max_error, std::abs(error));
+  }
+  m.amplitude = relief.size();
+  m.excursion = followed.size();
+  m.rms_error = m.samples > 0 ? std::sqrt(squares / static_cast<double>(m.samples)) : nan;
+  m.relative_error = m.amplitude > 0.0 ? m.rms_error / m.amplitude : nan;
+  return m;
+}
+
+SpectrumMetrics measure_spectrum(const RunSeries& series, const TickMetrics& ticks) {
+  std::vector<double> x;
+  std::vector<double> normal;
+  std::vector<double> tangential;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (!series.stroking[i]) continue;
+    x.push_back(series.distance[i]);
+    normal.push_back(series.normal[i]);
+    tangential.push_back(series.tangential[i]);
+  }
+  SpectrumMetrics m;
+  if (x.size() < 2 || ticks.rate <= 0.0) return m;
+  const double dt = 1.0 / ticks.rate;
+  const double dx = ticks.length / static_cast<double>(x.size() - 1);
+  m.normal_time = power_spectrum(normal, dt);
+  m.tangential_time = power_spectrum(tangential, dt);
+  m.normal_distance = power_spectrum(resample(x, normal, dx), dx);
+  m.tangential_distance = power_spectrum(resample(x, tangential, dx), dx);
+  return m;
+}
+
+UpdateMetrics measure_update(const RunSeries& series) {
+  UpdateMetrics m;
+  const std::vector<double>& times = series.update;
+  if (times.empty()) return m;
+  for (const double t : times) m.mean += t;
+  m.mean /= static_cast<double>(times.size());
+  m.p50 = percentile(times, 0.5);
+  m.p99 = percentile(times, 0.99);
+  m.p999 = percentile(times, 0.999);
+  m.max = percentile(times, 1.0);
+  const auto bin = [](double t) { return static_cast<int>(std::floor(bins_per_decade * std::log10(std::max(t, fastest_bin)))); };
+  const int first = bin(*std::min_element(times.begin(), times.end()));
+  const int last = bin(m.max);
+  for (int k = first; k <= last + 1; ++k) m.edges.push_back(std::pow(10.0, k / bins_per_decade));
+  m.counts.assign(m.edges.size() - 1, 0);
+  for (const double t : times) ++m.counts[static_cast<std::size_t>(std::clamp(bin(t), first, last) - first)];
+  return m;
+}
+
+/// Value of `y` where `x`, ascending apart from lag, first reaches `at`; not-a-number when it never does.
+double value_at(std::span<const double> x, std::span<const double> y, double at) {
+  double x0 = nan;
+  double y0 = nan;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!std::isfinite(x[i])) continue;
+    // A path's last tick may fall short of the whole length by rounding.
+    if (x[i] >= at - 1e-9 * std::abs(at)) return std::isfinite(x0) && x[i] > x0 ? y0 + (y[i] - y0) * (at - x0) / (x[i] - x0) : y[i];
+    x0 = x[i];
+    y0 = y[i];
+  }
+  return nan;
+}
+
+/// Length of one loop of a stroke that comes back to where it was (m); 0 for one that does not.
+double loop_length(const StrokePath& path, double travelled) {
+  if (path.recorded()) return path.closed() ? path.length() : 0.0;
+  if (path.closed()) return path.length();
+  // An open stroke repeats only there and back.
+  return travelled > 1.5 * path.length() ? 2.0 * path.length() : 0.0;
+}
+
+EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path, double travelled) {
+  EnergyMetrics m;
+  m.mean_loop = nan;
+  if (records.empty()) return m;
+  std::vector<double> total(series.size());
+  double lowest = infinity;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    total[i] = series.work[i] + series.stored[i];
+    lowest = std::min(lowest, total[i]);
+    m.generated = std::max(m.generated, total[i] - lowest);
+    m.absorbed = std::max(m.absorbed, -series.work[i]);
+    if (i == 0) continue;
+    const double held = records[i - 1].commanded.dot(records[i].probe.pose.position - records[i - 1].probe.pose.position);
+    if (std::isfinite(held)) m.held_work += held;
+  }
+  m.work = series.work.back();
+  const double loop = loop_length(path, travelled);
+  if (loop <= 0.0) return m;
+  for (double end = loop; end <= travelled * (1.0 + 1e-9); end += loop) {
+    const double energy = value_at(series.distance, total, end) - value_at(series.distance, total, end - loop);
+    if (std::isfinite(energy)) m.loops.push_back(energy);
+  }
+  if (m.loops.empty()) return m;
+  m.mean_loop = 0.0;
+  for (const double energy : m.loops) m.mean_loop += energy / static_cast<double>(m.loops.size());
+  return m;
+}
+
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+nlohmann::json peaks_json(const Spectrum& spectrum) {
+  return {{"peak_frequency", number(spectrum.peak_frequency)}, {"peak_density", number(spectrum.peak_density)}};
+}
+
+}  // namespace
+
+RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path) {
+  RunMetrics m;
+  m.ticks = measure_ticks(records, series);
+  m.force = measure_force(records, series);
+  m.direction = measure_direction(series);
+  m.height = measure_height(series);
+  m.spectrum = measure_spectrum(series, m.ticks);
+  m.update = measure_update(series);
+  m.energy = measure_energy(records, series, path, m.ticks.length);
+  return m;
+}
+
+RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path) {
+  return measure_run(records, derive_series(records, scene, path), path);
+}
+
+const char* flag_name(std::size_t bit) {
+  constexpr const char* names[] = {"contact",       "not_converged", "started_inside",    "input_not_finite",
+                                   "force_limited", "slew_limited",  "output_not_finite", "contacts_dropped"};
+  return bit < std::size(names) ? names[bit] : "unknown";
+}
+
+double percentile(std::span<const double> values, double p) {
+  std::vector<double> finite;
+  for (const double value : values) {
+    if (std::isfinite(value)) finite.push_back(value);
+  }
+  if (finite.empty()) return nan;
+  const double rank = std::ceil(std::clamp(p, 0.0, 1.0) * static_cast<double>(finite.size()));
+  const std::size_t index = rank < 1.0 ? 0 : std::min(finite.size() - 1, static_cast<std::size_t>(rank) - 1);
+  std::nth_element(finite.begin(), finite.begin() + static_cast<std::ptrdiff_t>(index), finite.end());
+  return finite[index];
+}
+
+std::string metrics_json(const RunMetrics& m) {
+  nlohmann::json flags;
+  for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) flags[flag_name(bit)] = m.ticks.flags[bit];
+  nlohmann::json loops = nlohmann::json::array();
+  for (const double energy : m.energy.loops) loops.push_back(number(energy));
+  const nlohmann::json json = {
+      {"ticks",
+       {{"count", m.ticks.ticks}, {"contact", m.ticks.contact}, {"duration", m.ticks.duration}, {"rate", m.ticks.rate},
+        {"length", m.ticks.length}, {"flags", flags}, {"safety_interventions", m.ticks.safety_interventions},
+        {"largest_intervention", number(m.ticks.largest_intervention)}}},
+      {"force",
+       {{"mean", number(m.force.mean)}, {"max", number(m.force.max)}, {"rms", number(m.force.rms)},
+        {"mean_normal", number(m.force.mean_normal)}, {"largest_jump", number(m.force.largest_jump)},
+        {"jump_tick", m.force.jump_tick}, {"jump_distance", number(m.force.jump_distance)}}},
+      {"direction",
+       {{"samples", m.direction.samples}, {"mean", number(m.direction.mean)}, {"p99", number(m.direction.p99)},
+        {"max", number(m.direction.max)}}},
+      {"height",
+       {{"samples", m.height.samples}, {"excluded", m.height.excluded}, {"rms_error", number(m.height.rms_error)},
+        {"max_error", number(m.height.max_error)}, {"amplitude", number(m.height.amplitude)},
+        {"relative_error", number(m.height.relative_error)}, {"excursion", number(m.height.excursion)}}},
+      {"spectrum",
+       {{"normal_time", peaks_json(m.spectrum.normal_time)}, {"tangential_time", peaks_json(m.spectrum.tangential_time)},
+        {"normal_distance", peaks_json(m.spectrum.normal_distance)},
+        {"tangential_distance", peaks_json(m.spectrum.tangential_distance)}}},
+      {"update",
+       {{"mean", number(m.update.mean)}, {"p50", number(m.update.p50)}, {"p99", number(m.update.p99)},
+        {"p999", number(m.update.p999)}, {"max", number(m.update.max)}}},
+      {"energy",
+       {{"work", number(m.energy.work)}, {"held_work", number(m.energy.held_work)}, {"absorbed", number(m.energy.absorbed)},
+        {"generated", number(m.energy.generated)}, {"loops", loops}, {"mean_loop", number(m.energy.mean_loop)}}}};
+  return json.dump(2);
+}
+
+}  // namespace asperity

@@ -1,0 +1,176 @@
+#include "asperity/study/series.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <variant>
+
+namespace asperity {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+// A step changes the height by more than this share of the map's range, and more steeply than this, within one texel.
+constexpr double step_share = 0.25;
+constexpr double step_slope = 1.0;
+// Weaker forces have no direction worth comparing (N).
+constexpr double least_force = 1e-3;
+
+const Coat* coat_of(const Surface& surface) {
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface);
+  return relief ? &(*relief)->coat() : nullptr;
+}
+
+const MeshSurface& base_of(const Surface& surface) {
+  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();
+  return **std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
+}
+
+/// The base mesh under a felt point, object frame.
+struct BasePoint {
+  std::uint32_t face = no_index;
+  Vec3 barycentric = Vec3::Zero();
+  Vec3 up = Vec3::UnitZ();  // gradient of the signed distance from the base
+  double height = 0.0;      // signed distance (m)
+};
+
+BasePoint base_point(const MeshSurface& base, const Vec3& p, Hint& hint) {
+  const Foot foot = base.closest(p, infinity, hint);
+  BasePoint point;
+  if (!foot.found()) return point;
+  point.face = foot.element;
+  point.barycentric = foot.barycentric;
+  const bool outside = (p - foot.point).dot(pseudonormal(base.mesh(), foot.element, foot.barycentric)) >= 0.0;
+  point.height = outside ? foot.distance : -foot.distance;
+  point.up = outside ? foot.normal : Vec3(-foot.normal);
+  if (foot.distance == 0.0) point.up = base.mesh().face_normal(foot.element);
+  return point;
+}
+
+/// Whether the relief has a step within one texel of `at`, looked for along `direction`. Object frame.
+bool step_along(const TriangleMesh& mesh, const Coat& coat, const BasePoint& at, const Vec3& direction) {
+  const BarycentricFrame frame = barycentric_frame(mesh, at.face);
+  const Vec3 flat = direction - direction.dot(frame.normal) * frame.normal;
+  if (flat.norm() < 1e-9) return false;
+  const Vec3 texel = coat.texel_size() * flat.normalized();
+  const Vec3 rate(frame.gradient[0].dot(texel), frame.gradient[1].dot(texel), frame.gradient[2].dot(texel));
+  const double least = std::max(step_share * (coat.highest() - coat.lowest()), step_slope * coat.texel_size());
+  // Half-texel samples from -1.5 to 1.5 texels: every pair one texel apart whose nearer end lies within one texel.
+  double heights[7];
+  for (int i = 0; i < 7; ++i) heights[i] = coat.sample(mesh, at.face, at.barycentric + 0.5 * (i - 3) * rate).height;
+  for (int i = 0; i + 2 < 7; ++i) {
+    if (std::abs(heights[i + 2] - heights[i]) > least) return true;
+  }
+  return false;
+}
+
+/// Derives one tick after the other; keeps the hints of the queries.
+class SeriesBuilder {
+ public:
+  SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks)
+      : scene_(scene), path_(path), hints_(std::make_unique<Hint[]>(scene.instances().size())) {
+    for (auto* column : {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.followed, &out_.relief,
+                         &out_.direction_error, &out_.work, &out_.stored, &out_.update}) {
+      column->reserve(ticks);
+    }
+  }
+
+  void add(const TraceRecord& tick) {
+    const StrokePose pose = path_.pose(tick.probe.time);
+    const bool stroking = pose.phase == StrokePhase::contact;
+    const Vec3& position = tick.probe.pose.position;
+    out_.time.push_back(tick.probe.time.count());
+    out_.stroking.push_back(stroking ? 1 : 0);
+    out_.distance.push_back(stroking ? pose.distance + (position - pose.point).dot(pose.tangent) : nan);
+    out_.force.push_back(tick.commanded.norm());
+    out_.normal.push_back(tick.commanded.dot(pose.normal));
+    out_.tangential.push_back(tick.commanded.dot(pose.tangent));
+    out_.update.push_back(tick.update_seconds);
+    add_energy(tick);
+    add_surface(tick, pose.tangent);
+    last_ = &tick;
+  }
+
+  RunSeries take() { return std::move(out_); }
+
+ private:
+  [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
+    const std::uint32_t index = tick.rendered.contact.instance;
+    const bool known = tick.rendered.flags.has(TickFlag::contact) && index < scene_.instances().size();
+    return known ? &scene_.instances()[index] : nullptr;
+  }
+
+  void add_energy(const TraceRecord& tick) {
+    if (last_) {
+      const Vec3 motion = tick.probe.pose.position - last_->probe.pose.position;
+      const double done = 0.5 * (tick.commanded + last_->commanded).dot(motion);
+      if (std::isfinite(done)) work_ += done;
+    }
+    out_.work.push_back(work_);
+    const Instance* instance = touched(tick);
+    const double depth = tick.rendered.contact.penetration;
+    out_.stored.push_back(instance ? 0.5 * instance->material.stiffness * depth * depth : 0.0);
+  }
+
+  void add_surface(const TraceRecord& tick, const Vec3& tangent) {
+    out_.followed.push_back(nan);
+    out_.relief.push_back(nan);
+    out_.direction_error.push_back(nan);
+    out_.near_step.push_back(0);
+    const Instance* instance = touched(tick);
+    if (!instance) return;
+    const Pose& pose = instance->world_from_object;
+    const MeshSurface& base = base_of(instance->surface);
+    const bool proxied = constrains(instance->law);
+    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
+    const BasePoint at = base_point(base, felt, hints_[tick.rendered.contact.instance]);
+    if (at.face == no_index) return;
+    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    add_height(*instance, at, proxied ? 0.0 : force.dot(at.up) / instance->material.stiffness, force);
+    add_direction(*instance, at, force);
+    if (const Coat* coat = coat_of(instance->surface)) {
+      const Vec3 along = pose.rotate_inverse(tangent);
+      const bool near = step_along(base.mesh(), *coat, at, along) || step_along(base.mesh(), *coat, at, along.cross(at.up));
+      out_.near_step.back() = near ? 1 : 0;
+    }
+  }
+
+  void add_height(const Instance& instance, const BasePoint& at, double deflection, const Vec3& force) {
+    const Coat* coat = coat_of(instance.surface);
+    const TriangleMesh& mesh = base_of(instance.surface).mesh();
+    const bool from_behind = force.dot(mesh.face_normal(at.face)) < 0.0 && !coat;
+    const double height = from_behind ? -at.height : at.height;
+    out_.followed.back() = height + deflection - scene_.probe_radius();
+    out_.relief.back() = coat ? coat->sample(mesh, at.face, at.barycentric).height : 0.0;
+  }
+
+  void add_direction(const Instance& instance, const BasePoint& at, const Vec3& force) {
+    if (!(force.norm() >= least_force)) return;
+    const TriangleMesh& mesh = base_of(instance.surface).mesh();
+    Vec3 reference = mesh.face_normal(at.face);
+    if (const Coat* coat = coat_of(instance.surface)) {
+      reference -= coat->sample(mesh, at.face, at.barycentric).gradient;
+    } else if (reference.dot(force) < 0.0) {
+      reference = -reference;
+    }
+    // The two-argument form keeps small angles, which an arc cosine would round away.
+    out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
+  }
+
+  const Scene& scene_;
+  const StrokePath& path_;
+  std::unique_ptr<Hint[]> hints_;
+  RunSeries out_;
+  const TraceRecord* last_ = nullptr;
+  double work_ = 0.0;
+};
+
+}  // namespace
+
+RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path) {
+  SeriesBuilder builder(scene, path, records.size());
+  for (const TraceRecord& tick : records) builder.add(tick);
+  return builder.take();
+}
+
+}  // namespace asperity

@@ -1,0 +1,45 @@
+#include "asperity/surface/mesh_surface.h"
+
+namespace asperity {
+
+Vec3 pseudonormal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept {
+  const Vec3 own = mesh.face_normal(face);
+  int zeros = 0;
+  for (int i = 0; i < 3; ++i) zeros += barycentric[i] <= 0.0 ? 1 : 0;
+  if (zeros == 0) return own;
+  const TriangleMesh::Triangle& corners = mesh.triangles()[face];
+  if (zeros == 2) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (barycentric[static_cast<int>(i)] > 0.0) return mesh.vertex_normal(corners[i]);
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (barycentric[i] > 0.0) continue;
+    const std::uint32_t other = mesh.neighbour(face, (i + 1) % 3);
+    return other == no_index ? own : Vec3(own + mesh.face_normal(other));
+  }
+  return own;
+}
+
+Vec3 interpolated_normal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept {
+  const TriangleMesh::Triangle& corners = mesh.triangles()[face];
+  const Vec3 sum = barycentric[0] * mesh.vertex_normal(corners[0]) + barycentric[1] * mesh.vertex_normal(corners[1]) +
+                   barycentric[2] * mesh.vertex_normal(corners[2]);
+  const double length = sum.norm();
+  return length > 0.0 ? Vec3(sum / length) : mesh.face_normal(face);
+}
+
+FieldSample MeshSurface::eval(const Vec3& p, Hint& hint) const noexcept {
+  const Foot nearest = index_.closest(p, infinity, hint.patch);
+  FieldSample sample;
+  if (!nearest.found()) return sample;
+  const bool outside = (p - nearest.point).dot(pseudonormal(mesh(), nearest.element, nearest.barycentric)) >= 0.0;
+  sample.value = outside ? nearest.distance : -nearest.distance;
+  sample.gradient = outside ? nearest.normal : Vec3(-nearest.normal);
+  // On the face itself the normal is the face's own, whichever side it was taken from.
+  if (nearest.distance == 0.0) sample.gradient = mesh().face_normal(nearest.element);
+  sample.element = nearest.element;
+  return sample;
+}
+
+}  // namespace asperity

@@ -1,0 +1,46 @@
+#pragma once
+
+#include "asperity/geometry/triangle_index.h"
+#include "asperity/surface/surface.h"
+
+namespace asperity {
+
+/// A triangle mesh touched as it is.
+class MeshSurface {
+ public:
+  explicit MeshSurface(TriangleIndex index) : index_(std::move(index)) {}
+
+  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
+    return index_.sweep(motion, radius, sides, hint.patch);
+  }
+  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept {
+    index_.contacts(position, radius, sides, hint.patch, out);
+  }
+  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept {
+    return index_.closest(p, bound, hint.patch);
+  }
+  /// Signed distance: exact where the mesh is closed and oriented; elsewhere signed by the nearest feature's normal.
+  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  [[nodiscard]] double skin() const noexcept { return index_.skin(); }
+  [[nodiscard]] Box bounds() const noexcept { return index_.mesh().bounds(); }
+
+  [[nodiscard]] const TriangleIndex& index() const noexcept { return index_; }
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return index_.mesh(); }
+  /// Front where front and back are told apart (closed and oriented), both elsewhere.
+  [[nodiscard]] Sides natural_sides() const noexcept {
+    return mesh().report().closed() && mesh().report().oriented() ? Sides::front : Sides::both;
+  }
+
+ private:
+  TriangleIndex index_;
+};
+static_assert(SurfaceQuery<MeshSurface>);
+
+/// Normal of the feature (face, edge or vertex) that a barycentric position lies on, whose sign tells inside from
+/// outside exactly (angle-weighted pseudonormals: Baerentzen and Aanaes 2005). Not unit on edges. [servo]
+Vec3 pseudonormal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept;
+
+/// Vertex normals interpolated over a face, unit: the smooth normal of force shading. [servo]
+Vec3 interpolated_normal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept;
+
+}  // namespace asperity

@@ -1,0 +1,53 @@
+# Targets of the project: one library a module, one test program a module, all with the same warnings.
+
+find_program(ASPERITY_CCACHE ccache)
+if(ASPERITY_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${ASPERITY_CCACHE}")
+endif()
+
+add_library(asperity_build_settings INTERFACE)
+if(PROJECT_IS_TOP_LEVEL)
+  target_compile_options(asperity_build_settings INTERFACE
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast -Wnon-virtual-dtor -Woverloaded-virtual -Werror
+    # GCC 12 reports false positives here inside Eigen and std::variant at -O2.
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+endif()
+if(ASPERITY_SANITIZE)
+  target_compile_options(asperity_build_settings INTERFACE -fsanitize=${ASPERITY_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(asperity_build_settings INTERFACE -fsanitize=${ASPERITY_SANITIZE})
+  target_compile_definitions(asperity_build_settings INTERFACE ASPERITY_SANITIZED)
+endif()
+
+# asperity_module(NAME DEPENDS modules... LIBRARIES public... PRIVATE private...)
+# A library from every .cpp in the current folder, with the alias asperity::NAME.
+function(asperity_module name)
+  cmake_parse_arguments(arg "" "" "DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  add_library(asperity_${name} STATIC ${sources})
+  add_library(asperity::${name} ALIAS asperity_${name})
+  set_target_properties(asperity_${name} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(asperity_${name} PUBLIC cxx_std_20)
+  target_include_directories(asperity_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include>)
+  foreach(module IN LISTS arg_DEPENDS)
+    target_link_libraries(asperity_${name} PUBLIC asperity_${module})
+  endforeach()
+  target_link_libraries(asperity_${name} PUBLIC ${arg_LIBRARIES})
+  target_link_libraries(asperity_${name} PRIVATE $<BUILD_INTERFACE:asperity_build_settings> ${arg_PRIVATE})
+  if(NOT name STREQUAL "core")
+    target_precompile_headers(asperity_${name} REUSE_FROM asperity_core)
+  endif()
+  set_property(GLOBAL APPEND PROPERTY ASPERITY_MODULES asperity_${name})
+endfunction()
+
+# asperity_test(NAME LIBRARIES ...): one test program from every .cpp in the current folder.
+function(asperity_test name)
+  cmake_parse_arguments(arg "" "" "LIBRARIES" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  add_executable(asperity_${name}_tests ${sources})
+  target_include_directories(asperity_${name}_tests PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_link_libraries(asperity_${name}_tests PRIVATE ${arg_LIBRARIES} GTest::gtest_main asperity_build_settings)
+  target_compile_definitions(asperity_${name}_tests PRIVATE
+    ASPERITY_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ASPERITY_SHARED_DATA="${PROJECT_SOURCE_DIR}/../shared/data")
+  gtest_discover_tests(asperity_${name}_tests DISCOVERY_MODE PRE_TEST PROPERTIES LABELS ${name} TIMEOUT 600)
+endfunction()
