@@ -2,7 +2,12 @@
 
 find_program(ASPERITY_CCACHE ccache)
 if(ASPERITY_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER "${ASPERITY_CCACHE}")
+  # Without these settings ccache passes by everything that uses a precompiled header.
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env
+    CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime "${ASPERITY_CCACHE}")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)
+  endif()
 endif()
 
 add_library(asperity_build_settings INTERFACE)
@@ -38,6 +43,9 @@ function(asperity_module name)
     target_precompile_headers(asperity_${name} REUSE_FROM asperity_core)
   endif()
   set_property(GLOBAL APPEND PROPERTY ASPERITY_MODULES asperity_${name})
+  if(ASPERITY_INSTALL)
+    install(TARGETS asperity_${name} EXPORT asperityTargets ARCHIVE)
+  endif()
 endfunction()
 
 # asperity_test(NAME LIBRARIES ...): one test program from every .cpp in the current folder.

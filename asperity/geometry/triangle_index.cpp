@@ -9,13 +9,14 @@ namespace asperity {
 namespace {
 
 // The skin is large against double rounding of the coordinates and small against any feature of the mesh.
-constexpr double skin_of_mean_edge = 1e-5;
+constexpr double skin_of_mean_edge = 1e-6;
 constexpr double least_skin_of_size = 1e-9;
-// A motion may come this fraction of a skin nearer than a resting probe before it counts as a touch: sliding along a
-// plane is no touch, whatever its rounding.
-constexpr double slack_of_skin = 0.25;
-// A touch found within this fraction of the slack is a touch.
-constexpr double touch_of_slack = 0.01;
+// A motion is blocked when it would come nearer than the first, and ends at the second. Between the two a probe slides freely, so
+// that rounding never holds it where it rests.
+constexpr double blocked_in_skins = 0.5;
+constexpr double stopped_in_skins = 0.75;
+// Either distance counts as reached within this share of a skin.
+constexpr double reached_in_skins = 0.0025;
 constexpr int newton_limit = 32;
 // Two contacts whose normals differ by less than this angle (rad) are one plane: their common line is undefined.
 constexpr double same_plane_cosine = 1.0 - 1e-10;
@@ -144,26 +145,34 @@ void TriangleIndex::sweep_face(std::uint32_t face, const Segment& motion, double
                                SweptHit& best) const noexcept {
   const auto [a, b, c] = mesh_->corners(face);
   const Vec3 direction = motion.to - motion.from;
-  if (sides == Sides::front && (b - a).cross(c - a).dot(motion.from - a) < 0.0) return;
-  const double touch = radius + touch_of_slack * slack_of_skin * skin_;
+  const Vec3 cross = (b - a).cross(c - a);
+  if (sides == Sides::front && cross.dot(motion.from - a) < 0.0) return;
+  const double blocked = radius + (blocked_in_skins + reached_in_skins) * skin_;
+  const double stopped = radius + (stopped_in_skins + reached_in_skins) * skin_;
   double t = 0.0;
-  TrianglePoint at;
+  double t_stop = -1.0;
+  TrianglePoint at_stop;
   for (int i = 0; i < newton_limit; ++i) {
     const Vec3 x = motion.from + t * direction;
-    at = closest_point_on_triangle(x, a, b, c);
+    const TrianglePoint at = closest_point_on_triangle(x, a, b, c);
     const double distance = std::sqrt(at.squared_distance);
-    // d(distance)/dt: the distance is convex along the motion, so the tangent never overshoots its first root.
     // Exactly on a sheet its side is not decided yet: the motion away from it decides.
-    if (distance == 0.0 && (sides == Sides::both || (b - a).cross(c - a).dot(direction) >= 0.0)) return;
+    if (distance == 0.0 && (sides == Sides::both || cross.dot(direction) >= 0.0)) return;
+    // d(distance)/dt: the distance is convex along the motion, so the tangent never overshoots its first root.
     const double slope = distance > 0.0 ? (x - at.point).dot(direction) / distance : -1.0;
     if (slope >= 0.0) return;
-    if (distance <= touch) break;
-    t += (distance - radius) / -slope;
+    if (t_stop < 0.0 && distance <= stopped) {
+      t_stop = t;
+      at_stop = at;
+    }
+    if (distance <= blocked) break;
+    const double next = radius + (t_stop < 0.0 ? stopped_in_skins : blocked_in_skins) * skin_;
+    t += (distance - next) / -slope;
     if (t >= best.t) return;
   }
   best.hit = true;
-  best.t = t;
-  best.contact = surface_foot(face, at, motion.from + t * direction, (b - a).cross(c - a).normalized());
+  best.t = std::max(t_stop, 0.0);
+  best.contact = surface_foot(face, at_stop, motion.from + best.t * direction, cross.normalized());
 }
 
 template <class Visit>
@@ -193,14 +202,15 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
 SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
   const double length = direction.norm();
-  const double grown = radius + (1.0 - slack_of_skin) * skin_;
+  const double grown = radius + stopped_in_skins * skin_;
+  const double blocked = radius + blocked_in_skins * skin_;
   SweptHit best;
   if (length == 0.0) return best;
   if (length > long_motion_in_edges * mesh_->mean_edge()) {
     std::visit(
         [&](const auto& structure) {
           along(structure, motion, grown, [&](std::uint32_t face) {
-            sweep_face(face, motion, grown, sides, best);
+            sweep_face(face, motion, radius, sides, best);
             return best.t;
           });
         },
@@ -213,7 +223,7 @@ SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides,
     // What the ball rests on cannot be hit by a motion that does not go into it.
     if (!patch.rested || patch.rest_position != motion.from || patch.rest_radius != radius) return false;
     for (const Foot& contact : patch.rest_contacts) {
-      if (contact.element == face) return contact.distance + std::min(0.0, contact.normal.dot(direction)) >= grown;
+      if (contact.element == face) return contact.distance + std::min(0.0, contact.normal.dot(direction)) >= blocked;
     }
     return false;
   };
@@ -223,14 +233,14 @@ SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides,
     // The distance is convex: along the motion it stays above its tangent at the start.
     const double bound = distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
     if (bound > touch) return;
-    if ((bound <= grown || distance <= grown + margin) && !resting_on(face)) sweep_face(face, motion, grown, sides, best);
+    if (bound <= grown && !resting_on(face)) sweep_face(face, motion, radius, sides, best);
     all_near_end = near_end.push_back(face) && all_near_end;
   });
   if (!best.hit && all_near_end) {
     // What touches at the end was among them: the next question is about the contacts there.
     ContactSet contacts;
     for (const std::uint32_t face : near_end) add_contact(face, motion.to, touch, sides, contacts);
-    drop_implied(contacts);
+    settle_edges(motion.to, contacts);
     remember(motion.to, radius, sides, contacts, patch);
   }
   return best;
@@ -252,16 +262,27 @@ void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double
   out.push_back(contact);
 }
 
-// The plane of a touched face keeps the ball off every edge that does not rise over it. Keeping such an edge as a plane of its
-// own would hold a point back at every convex edge it crosses, as if it rolled over it.
-void TriangleIndex::drop_implied(ContactSet& contacts) const noexcept {
+// A ball over a face also comes near the edges of its neighbours. The face's own plane keeps it off those edges; taken as
+// planes of their own, which lean back towards the ball, they would hold it at every edge it wants to slide across.
+void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {
+  const auto inside_face = [](const Foot& foot) { return foot.barycentric.minCoeff() > 0.0; };
   for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
-    if (contacts[i].barycentric.minCoeff() > 0.0) continue;
+    Foot& edge = contacts[i];
+    if (inside_face(edge)) continue;
+    const Foot* guard = nullptr;
     for (const Foot& face : contacts) {
-      if (&face == &contacts[i] || face.barycentric.minCoeff() <= 0.0) continue;
-      if (face.normal.dot(contacts[i].point - face.point) > rounding_) continue;
+      if (inside_face(face) && face.normal.dot(edge.point - face.point) <= rounding_) guard = &face;
+    }
+    if (guard == nullptr) continue;
+    double highest = -infinity;
+    for (const Vec3& corner : mesh_->corners(edge.element)) highest = std::max(highest, guard->normal.dot(corner - guard->point));
+    if (highest <= rounding_) {
+      // Convex: the whole neighbour lies below the face's plane.
       contacts.swap_remove(i);
-      break;
+    } else {
+      // Concave: what stops the slide is the neighbour's own plane.
+      const Vec3 normal = mesh_->face_normal(edge.element);
+      edge.normal = normal.dot(position - edge.point) < 0.0 ? Vec3(-normal) : normal;
     }
   }
 }
@@ -289,7 +310,7 @@ void TriangleIndex::contacts(const Vec3& position, double radius, Sides sides, T
   scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (distance <= reach + margin) add_contact(face, position, reach, sides, out);
   });
-  drop_implied(out);
+  settle_edges(position, out);
   remember(position, radius, sides, out, patch);
 }
 

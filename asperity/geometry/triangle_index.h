@@ -14,7 +14,7 @@ enum class SearchStructure { bvh, octree };
 
 /// One query interface over a mesh and either search structure. Owns both mesh and structure.
 ///
-/// Elementary queries are exact. The swept queries treat the probe as a ball of radius r plus a thin `skin` (1e-5 of
+/// Elementary queries are exact. The swept queries treat the probe as a ball of radius r plus a thin `skin` (1e-6 of
 /// the mean edge): resting on the surface means resting one skin above it, which keeps rounding from
 /// ever carrying a probe through; the laws subtract the skin again, so forces do not contain it.
 ///
@@ -61,8 +61,8 @@ class TriangleIndex {
   void scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept;
   /// Bound on the error of the distances that scan_ball gives (m).
   [[nodiscard]] double error(const Vec3& position) const noexcept;
-  /// Leaves out edges and corners that the plane of a touched face keeps the ball off anyway.
-  void drop_implied(ContactSet& contacts) const noexcept;
+  /// Makes of the edges and corners among the contacts what they mean beside a touched face.
+  void settle_edges(const Vec3& position, ContactSet& contacts) const noexcept;
   void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts, TrianglePatch& patch) const noexcept;
   [[nodiscard]] Foot surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p, const Vec3& face_normal) const noexcept;
   void sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides, SweptHit& best) const noexcept;

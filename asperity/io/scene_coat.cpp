@@ -230,7 +230,8 @@ class CoatReader {
     Result<HeightMap> heights = HeightMap::build(image_, channel_, settings);
     if (!heights) {
       Error error = std::move(heights).error().in_file(path_.string());
-      error.place = error.place.empty() ? reader_.place_of("height_map") : reader_.place_of(error.place);
+      const char* asked = channel_ == Channel::automatic ? "height_map" : "channel";
+      error.place = reader_.place_of(error.place.empty() ? asked : error.place.c_str());
       if (error.code == ErrorCode::bad_value) error.code = ErrorCode::bad_map;
       return error;
     }

@@ -73,33 +73,49 @@ inline Vec3 rolling_target(const ConstraintPlane& plane, const Vec3& foot, const
 template <class Constraints>
 ConstraintSolution solve_constraints(Constraints& constraints, const Vec3& from, const Vec3& goal) noexcept {
   constexpr int move_limit = 64;
-  // From here on a ball that rolls over an edge right above its goal may stop when a roll gains next to nothing.
+  // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
+  // either side is left before the other is felt; and a ball right above the edge it rolls over may stop, or roll in larger steps.
   constexpr int patience = 8;
   constexpr double least_gain = 1e-6;
   ConstraintSolution solution;
   solution.proxy = from;
+  PlaneSet earlier;
   double distance = infinity;
+  double stride = 1.0;
   for (int move = 0; move < move_limit; ++move) {
+    const bool patient = move >= patience;
+    if (patient) earlier = solution.planes;
     solution.planes.clear();
     constraints.contacts(solution.proxy, solution.planes);
     const bool single = solution.planes.size() == 1;
     const bool rolls = move > 0 && single && constraints.rolls(solution.planes[0]);
     Vec3 target = single ? onto_plane(goal, solution.planes[0]) : project_onto_planes(goal, solution.planes, true).point;
-    if (rolls) target = rolling_target(solution.planes[0], constraints.foot(solution.planes[0]), goal, target);
-    const Vec3 step = target - solution.proxy;
+    const Vec3 foot = rolls ? constraints.foot(solution.planes[0]) : goal;
+    if (rolls) target = rolling_target(solution.planes[0], foot, goal, target);
+    Vec3 step = target - solution.proxy;
     if (step.norm() <= constraints.tolerance()) {
       // Without contact nothing may remain between proxy and probe: free space gives no force at all.
       if (solution.planes.empty()) solution.proxy = target;
       solution.converged = true;
       break;
     }
-    if (rolls && move >= patience) {
-      const double now = (solution.proxy - goal).norm();
-      solution.converged = std::exchange(distance, now) - now < least_gain * now;
-      if (solution.converged) break;
+    if (rolls && patient) {
+      if ((goal - foot).dot(solution.planes[0].normal) < 0.0) {
+        // The edge is between ball and goal: the ball rolls off it, slowly at first.
+        stride *= 2.0;
+        step *= std::min(stride, 0.2 * (solution.proxy - foot).norm() / step.norm());
+      } else {
+        const double now = (solution.proxy - goal).norm();
+        solution.converged = std::exchange(distance, now) - now < least_gain * now;
+        if (solution.converged) break;
+      }
+    } else if (patient && move % 4 == 0) {
+      PlaneSet both = solution.planes;
+      for (const ConstraintPlane& plane : earlier) both.push_back(plane);
+      step = project_onto_planes(goal, both, true).point - solution.proxy;
     }
-    const double t = constraints.sweep(Segment{solution.proxy, target});
-    solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : target;
+    const double t = constraints.sweep(Segment{solution.proxy, solution.proxy + step});
+    solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
   }
   solution.projection = project_onto_planes(goal, solution.planes, false);
   return solution;

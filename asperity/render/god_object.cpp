@@ -6,8 +6,8 @@ namespace asperity {
 
 namespace {
 
-// A move shorter than this share of the skin changes no force that the skin's own removal would not hide.
-constexpr double tolerance_of_skin = 0.5;
+// Near the corner of a valley single moves can be a fraction of the skin long and still lead out of it.
+constexpr double tolerance_of_skin = 1e-3;
 
 const MeshSurface& constraint_mesh(const Surface& surface) noexcept {
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();

@@ -24,7 +24,7 @@ constexpr double surroundings = 0.75;  // of the stroke's size, on every side
 constexpr int sparse = 8;
 constexpr int largest_block = 3;
 constexpr double smallest_size = 0.5;
-constexpr double uneven_cost = 1.6;  // of a ray where the surface is uneven, relative to the mean one
+constexpr double uneven_cost = 2.4;  // of a ray where the surface is uneven, relative to the mean one
 constexpr double edge_share = 0.2;   // of the budget that smooth edges may always have
 
 Vec3 average_normal(const StrokePath& path) {

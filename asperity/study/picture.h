@@ -18,7 +18,7 @@ struct PictureSettings {
   int width = 900;       ///< pixels, 16 to 4096
   int height = 600;      ///< pixels, 16 to 4096
   int threads = 2;       ///< 1 to 64
-  double budget = 2.5;   ///< s of wall time to aim at, above 0; detail is given up where a coarse pass says that it would be exceeded
+  double budget = 1.6;   ///< s of wall time to aim at, above 0; detail is given up where a coarse pass says that it would be exceeded
 };
 
 /// A picture of what is touched, and the stroke over it coloured by the force felt there.

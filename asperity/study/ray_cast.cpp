@@ -63,15 +63,9 @@ bool beyond_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
   return false;
 }
 
-/// First hit of a relief. Nothing of it is farther from its base than the highest of its heights, so a ray may go straight
-/// to where a ball of that radius first meets the base.
+/// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is wide.
 Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
   const bool open = !surface.base().mesh().report().closed();
-  const double reach = surface.coat().amplitude_bound() + surface.skin();
-  const Segment whole{origin + part.from * direction, origin + part.to * direction};
-  const SweptHit shell = surface.base().segment(whole, reach, Sides::both, hint);
-  if (!shell.hit) return {};
-  part.from += shell.t * (part.to - part.from);
   const double after = surface.skin() / direction.norm();
   for (int i = 0; i < most_rim_hits && part.from < part.to; ++i) {
     const Segment motion{origin + part.from * direction, origin + part.to * direction};

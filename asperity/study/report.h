@@ -59,7 +59,7 @@ std::string summarise(const RunReport& report);
 /// What the numbers of one law say, and nothing else ("follows the relief within 0.4 %; feeds no energy"). [main]
 std::string verdict(const RunMetrics& metrics);
 
-/// The page. Series longer than about 4000 points are thinned to the extremes of each stretch, and the page says so.
+/// The page. Long series are thinned to the extremes of each stretch, and the page says so.
 /// Errors: bad_value for a series whose columns differ in length, or a comparison without entries. [main]
 Result<std::string> run_report_html(const RunReport& report);
 Result<std::string> compare_report_html(const CompareReport& report);

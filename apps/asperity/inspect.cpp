@@ -1,0 +1,204 @@
+// asperity inspect: what a file is, what is wrong with it, and what can be felt of it on which device.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "apps/asperity/feel.h"
+#include "apps/asperity/run.h"
+#include "apps/asperity/scene_argument.h"
+#include "asperity/field/image.h"
+#include "asperity/io/image_io.h"
+#include "asperity/io/mesh_io.h"
+#include "asperity/io/trace_file.h"
+
+namespace asperity::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InspectOptions {
+  std::string file;
+  SceneArgument scene;
+};
+
+/// What inspecting found, in the order it is shown.
+struct Findings {
+  std::string kind;
+  std::vector<ReportFact> facts;
+  std::vector<std::string> problems;  ///< what is wrong with it
+  std::vector<std::string> felt;      ///< what can be felt of it
+  void fact(std::string name, std::string value) { facts.push_back({std::move(name), std::move(value)}); }
+};
+
+void mesh_facts(const TriangleMesh& mesh, Findings& found) {
+  const MeshReport& r = mesh.report();
+  found.fact("triangles", fmt::format("{}", r.triangles));
+  found.fact("vertices", fmt::format("{} ({} merged at equal positions)", r.vertices, r.welded_vertices));
+  found.fact("texture coordinates", mesh.has_uvs() ? "yes" : "no");
+  found.fact("closed, oriented", fmt::format("{}, {}", r.closed() ? "yes" : "no", r.oriented() ? "yes" : "no"));
+  found.fact("parts", fmt::format("{}", r.components));
+  const auto problem = [&](std::size_t count, const char* what) {
+    if (count > 0) found.problems.push_back(fmt::format("{} {}", count, what));
+  };
+  problem(r.dropped_degenerate, "triangles without area were left out");
+  problem(r.dropped_duplicate, "triangles given twice were left out");
+  problem(r.boundary_edges, "edges have one triangle only: the mesh is open and is touched from both sides");
+  problem(r.nonmanifold_edges, "edges have three or more triangles");
+  problem(r.misoriented_edges, "edges lie between triangles that face opposite ways");
+  problem(r.nonmanifold_vertices, "vertices join more than one fan of triangles");
+  constexpr double sliver = 100.0;
+  if (r.worst_aspect > sliver) found.problems.push_back(fmt::format("the thinnest triangle is {:.0f} times as long as high", r.worst_aspect));
+  for (const std::string& note : mesh.notes()) found.problems.push_back(note);
+}
+
+Result<Findings> inspect_trace(const std::string& file) {
+  ASPERITY_TRY(const Trace trace, read_trace(file));
+  Findings found{"trace", {}, {}, {}};
+  found.fact("ticks", fmt::format("{} at {:g} Hz", trace.records.size(), trace.metadata.rate));
+  found.fact("written by", trace.metadata.program);
+  found.fact("command", trace.metadata.command);
+  found.fact("device", trace.metadata.device);
+  found.fact("force hash", format_hash(force_hash(trace.records)));
+  double largest = 0.0;
+  std::size_t contact = 0;
+  for (const TraceRecord& record : trace.records) {
+    largest = std::max(largest, record.commanded.norm());
+    contact += record.rendered.flags.has(TickFlag::contact) ? 1U : 0U;
+  }
+  found.fact("in contact", fmt::format("{} ticks, at most {:.3g} N", contact, largest));
+  if (!trace.complete) found.problems.push_back("not whole: " + trace.damage);
+  return found;
+}
+
+Result<Findings> inspect_scene(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
+  Findings found{"scene", {}, {}, {}};
+  found.fact("name", experiment.name);
+  for (const ReportFact& fact : setup_facts(experiment)) found.facts.push_back(fact);
+  found.fact("duration", fmt::format("{:.3g} s, {} ticks", experiment.path.duration().count(),
+                                     session_ticks(experiment.path.duration(), Seconds(1.0 / experiment.rate))));
+  found.fact("memory", fmt::format("{:.2f} MB", static_cast<double>(experiment.scene.memory_bytes()) * 1e-6));
+  for (const std::string& note : experiment.notes) found.problems.push_back(note);
+  for (const Instance& instance : experiment.scene.instances()) {
+    for (std::string& line : feel_of(experiment, instance)) found.felt.push_back(fmt::format("{}: {}", instance.name, line));
+  }
+  return found;
+}
+
+/// A mesh alone: the file as it is, then what can be felt of it with the defaults.
+Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(MeshSource source, read_mesh(options.file));
+  Findings found{"mesh", {}, {}, {}};
+  const std::vector<std::string> notes = source.notes;
+  Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source));
+  if (!mesh) return std::move(mesh).error().in_file(options.file);
+  const Vec3 extent = mesh->bounds().extent();
+  found.fact("size", fmt::format("{:.4g} x {:.4g} x {:.4g} of the file's unit, which it does not state", extent.x(), extent.y(), extent.z()));
+  mesh_facts(*mesh, found);
+  for (const std::string& note : notes) found.problems.push_back(note);
+  ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
+  for (const ReportFact& fact : scene.facts) {
+    if (fact.name.starts_with("surface") || fact.name == "device") found.facts.push_back({"as a scene: " + fact.name, fact.value});
+  }
+  found.felt = scene.felt;
+  return found;
+}
+
+/// A map alone, laid on a sheet so that what can be felt of it has a size.
+Result<Findings> inspect_image(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(const Image image, read_image(options.file));
+  Findings found{"map", {}, {}, {}};
+  found.fact("pixels", fmt::format("{} x {}", image.width, image.height));
+  found.fact("channels", fmt::format("{} of {} bits", image.channels, image.bits));
+  Result<ChannelChoice> choice = choose_channel(image, Channel::automatic);
+  if (!choice) return std::move(choice).error().in_file(options.file);
+  found.fact("heights", fmt::format("{} channel: {}", to_string(choice->channel), choice->reason));
+  if (image.bits == 8) found.problems.push_back("8 bits: heights come in 255 steps, which can be felt as such on a tall relief");
+  const std::vector<float> values = extract_channel(image, choice->channel);
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  found.fact("values used", fmt::format("{:.3f} to {:.3f} of white", static_cast<double>(*low), static_cast<double>(*high)));
+  if (*low == *high) found.problems.push_back("every pixel is equal: there is no relief in it");
+  InspectOptions laid = options;
+  laid.scene.scene = "M_a-H_0";
+  laid.scene.relief = options.file;
+  laid.scene.mapping = "triplanar";
+  ASPERITY_TRY(const Findings scene, inspect_scene(laid, progress));
+  for (const std::string& note : scene.problems) {
+    if (note.starts_with("coat:")) found.problems.push_back(note);
+  }
+  for (const ReportFact& fact : scene.facts) {
+    if (fact.name.starts_with("surface")) found.fact("laid on a sheet", fact.value);
+  }
+  found.felt = scene.felt;
+  return found;
+}
+
+bool looks_like_image(const std::string& file) {
+  std::string extension = fs::path(file).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+Result<Findings> inspect_any(InspectOptions options, const Progress& progress) {
+  options.scene.scene = options.file;
+  std::error_code ignored;
+  if (fs::is_regular_file(options.file, ignored)) {
+    if (is_trace_file(options.file)) return inspect_trace(options.file);
+    if (looks_like_image(options.file)) return inspect_image(options, progress);
+    ASPERITY_TRY(const SceneText scene, find_scene(options.file));
+    // A mesh becomes a scene made on the spot; a scene file stands as it is.
+    const bool mesh = fs::path(options.file).extension() != ".json" && scene.folder == ".";
+    if (mesh) return inspect_mesh(options, progress);
+  }
+  return inspect_scene(options, progress);
+}
+
+void print_findings(const std::string& file, const Findings& found) {
+  std::cout << fmt::format("{}: a {}\n", file, found.kind);
+  for (const ReportFact& fact : found.facts) std::cout << fmt::format("  {}: {}\n", fact.name, fact.value);
+  if (!found.problems.empty()) std::cout << "To know:\n";
+  for (const std::string& problem : found.problems) std::cout << "  - " << problem << '\n';
+  if (!found.felt.empty()) std::cout << "What can be felt:\n";
+  for (const std::string& line : found.felt) std::cout << "  - " << line << '\n';
+}
+
+Result<int> inspect(const InspectOptions& options, const Console& console) {
+  ASPERITY_TRY(const Findings found, inspect_any(options, console.progress()));
+  if (console.json) {
+    Json facts = Json::object();
+    for (const ReportFact& fact : found.facts) facts[fact.name] = fact.value;
+    console.print(Json{{"file", options.file}, {"kind", found.kind}, {"facts", facts}, {"to_know", found.problems}, {"felt", found.felt}});
+  } else {
+    print_findings(options.file, found);
+  }
+  return exit_success;
+}
+
+}  // namespace
+
+CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
+  CLI::App* command = app.add_subcommand("inspect", "Say what a mesh, map, scene or trace is, what is wrong with it, and what can be felt of it");
+  auto options = std::make_shared<InspectOptions>();
+  command->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a scene, a built-in scene or a trace")->required();
+  command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
+  command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
+  command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
+  command->add_option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");
+  command->add_option("--speed", options->scene.speed, "Of the hand: 20mm/s");
+  command->add_option("--force", options->scene.force, "Of the hand: 1N");
+  add_console_options(*command, console);
+  command->footer(
+      "Examples:\n"
+      "  asperity inspect bunny.obj\n"
+      "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
+      "  asperity inspect out/icosphere-relief/trace.asptrace --json");
+  command->callback([options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });
+  return command;
+}
+
+}  // namespace asperity::program

@@ -1,0 +1,166 @@
+#include "apps/asperity/run.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+
+#include "asperity/io/trace_file.h"
+#include "asperity/render/step.h"
+
+namespace asperity::program {
+namespace {
+
+// A tick takes about 0.4 kB: what is kept stays under 1 GB.
+constexpr std::uint64_t most_ticks = 2'000'000;
+
+template <class Probe>
+Result<RunResult> run_with(const Experiment& experiment, Probe& probe, const std::function<Status(const TraceRecord&)>& record,
+                           const Progress& progress) {
+  ASPERITY_TRY(SafetyStage safety, SafetyStage::build(SafetySettings::from_profile(experiment.device)));
+  SessionSettings settings;
+  settings.dt = Seconds(1.0 / experiment.rate);
+  settings.expected_ticks = session_ticks(experiment.path.duration(), settings.dt);
+  RunResult result;
+  result.records.reserve(settings.expected_ticks);
+  ProxyState state;
+  Status written = success();
+  const auto keep = [&](const TraceRecord& tick) {
+    result.records.push_back(tick);
+    if (record) written = record(tick);
+    return written.ok();
+  };
+  const auto render = [&](const ProbeSample& sample, Seconds dt) { return step(experiment.scene, state, sample, dt); };
+  result.summary = run_session(render, probe, safety, settings, keep, progress);
+  ASPERITY_CHECK(std::move(written));
+  result.hash = force_hash(result.records);
+  return result;
+}
+
+std::string processor_name() {
+  std::ifstream stream("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(stream, line)) {
+    if (line.starts_with("model name")) {
+      const std::size_t colon = line.find(": ");
+      if (colon != std::string::npos) return line.substr(colon + 2);
+    }
+  }
+  return {};
+}
+
+std::string machine_line() {
+  utsname system{};
+  if (::uname(&system) != 0) return processor_name();
+  const std::string processor = processor_name();
+  return fmt::format("{}{}{} {} {}", processor, processor.empty() ? "" : ", ", system.sysname, system.release, system.machine);
+}
+
+std::string surface_fact(const Instance& instance) {
+  const TriangleMesh& mesh = base_mesh(instance.surface);
+  const Vec3 extent = mesh.bounds().extent();
+  std::string text = fmt::format("{} triangles, {} x {} x {}", mesh.report().triangles, format_length(extent.x()), format_length(extent.y()),
+                                 format_length(extent.z()));
+  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
+    const Coat& coat = (*relief)->coat();
+    text += fmt::format(", relief {} to {}, texel {}", format_length(coat.lowest()), format_length(coat.highest()), format_length(coat.texel_size()));
+  }
+  return text;
+}
+
+}  // namespace
+
+Status check_length(const Experiment& experiment) {
+  const std::uint64_t ticks = session_ticks(experiment.path.duration(), Seconds(1.0 / experiment.rate));
+  if (ticks <= most_ticks) return success();
+  return Error{ErrorCode::too_large, fmt::format("takes {} ticks", ticks), experiment.name, "stroke",
+               fmt::format("at most {} ticks: a shorter or faster stroke, or a lower rate", most_ticks)};
+}
+
+Result<RunResult> run_experiment(const Experiment& experiment, const std::function<Status(const TraceRecord&)>& record,
+                                 const Progress& progress) {
+  ASPERITY_CHECK(check_length(experiment));
+  if (experiment.probe == ProbeKind::ideal) {
+    Result<IdealProbe> probe = IdealProbe::build(experiment.path, experiment.ideal);
+    if (!probe) return std::move(probe).error().at("probe.ideal");
+    return run_with(experiment, *probe, record, progress);
+  }
+  Result<SimulatedDevice> device = SimulatedDevice::build(experiment.path, experiment.device, experiment.hand, experiment.simulated);
+  if (!device) return std::move(device).error().at("probe.dynamic");
+  return run_with(experiment, *device, record, progress);
+}
+
+std::string law_names_of(const Scene& scene) {
+  std::string names;
+  for (const Instance& instance : scene.instances()) {
+    const std::string name = law_name(instance.law);
+    if (names.find(name) == std::string::npos) names += (names.empty() ? "" : ", ") + name;
+  }
+  return names;
+}
+
+std::vector<ReportFact> setup_facts(const Experiment& experiment) {
+  std::vector<ReportFact> facts;
+  for (const Instance& instance : experiment.scene.instances()) {
+    facts.push_back({fmt::format("surface \"{}\"", instance.name), surface_fact(instance)});
+    facts.push_back({fmt::format("law, stiffness of \"{}\"", instance.name),
+                     fmt::format("{}, {:.3g} N/mm", law_name(instance.law), instance.material.stiffness * 1e-3)});
+  }
+  facts.push_back({"device", fmt::format("{}: {:g} N, {:g} N/mm, {} steps", experiment.device.name, experiment.device.max_force,
+                                         experiment.device.max_stiffness * 1e-3, format_length(experiment.device.position_resolution))});
+  const double radius = experiment.scene.probe_radius();
+  facts.push_back({"probe", fmt::format("{}, {}, {:g} Hz", experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic",
+                                        radius > 0.0 ? "radius " + format_length(radius) : std::string("a point"), experiment.rate)});
+  if (experiment.probe == ProbeKind::dynamic) facts.push_back({"hand", experiment.hand.name});
+  const StrokeSettings& stroke = experiment.stroke;
+  std::string text = fmt::format("{}, {}", to_string(stroke.type), format_length(experiment.path.length()));
+  if (stroke.type != StrokeType::recorded) {
+    text += fmt::format(" at {:.3g} mm/s, {}", stroke.speed * 1e3,
+                        stroke.press == PressMode::force ? fmt::format("pressed with {:.3g} N", stroke.normal_force) : "depth " + format_length(stroke.depth));
+  }
+  facts.push_back({"stroke", text});
+  return facts;
+}
+
+ReportOrigin report_origin(const Experiment& experiment, const Console& console) {
+  ReportOrigin origin;
+  origin.title = experiment.name;
+  origin.command = console.command_line;
+  origin.machine = machine_line();
+  origin.date = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
+  origin.program = program_name();
+  origin.notes = experiment.notes;
+  return origin;
+}
+
+Status make_output_folder(const std::string& folder) {
+  std::error_code problem;
+  std::filesystem::create_directories(folder, problem);
+  if (problem || !std::filesystem::is_directory(folder, problem)) {
+    return Error{ErrorCode::file_unwritable, fmt::format("cannot be made a folder: {}", problem ? problem.message() : "something else has that name"),
+                 folder, {}, "a folder that can be written to (--out DIR)"};
+  }
+  return success();
+}
+
+std::string format_seconds(double seconds) {
+  if (!std::isfinite(seconds)) return "-";
+  if (seconds >= 1.0) return fmt::format("{:.3g} s", seconds);
+  if (seconds >= 1e-3) return fmt::format("{:.3g} ms", seconds * 1e3);
+  if (seconds >= 1e-6) return fmt::format("{:.3g} us", seconds * 1e6);
+  return fmt::format("{:.0f} ns", seconds * 1e9);
+}
+
+std::string flag_list(const TickMetrics& ticks) {
+  std::string list;
+  for (std::size_t bit = 1; bit < ticks.flags.size(); ++bit) {
+    if (ticks.flags[bit] > 0) list += fmt::format("{}{} ({} ticks)", list.empty() ? "" : ", ", flag_name(bit), ticks.flags[bit]);
+  }
+  return list.empty() ? "none" : list;
+}
+
+}  // namespace asperity::program

@@ -1,0 +1,68 @@
+// asperity scenes: the built-in scenes. asperity schema: the schema of scene files.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+
+#include "apps/asperity/command.h"
+#include "asperity/io/experiment.h"
+
+namespace asperity::program {
+namespace {
+
+Result<int> list_scenes(const Console& console) {
+  if (console.json) {
+    Json list = Json::array();
+    for (const BuiltinScene& scene : builtin_scenes()) list.push_back(Json{{"name", scene.name}, {"summary", scene.summary}});
+    console.print(list);
+    return exit_success;
+  }
+  std::size_t width = 0;
+  for (const BuiltinScene& scene : builtin_scenes()) width = std::max(width, scene.name.size());
+  for (const BuiltinScene& scene : builtin_scenes()) std::cout << fmt::format("{:<{}}  {}\n", scene.name, width, scene.summary);
+  return exit_success;
+}
+
+Result<int> print_scene(const std::string& name) {
+  ASPERITY_TRY(const std::string text, builtin_scene_json(name));
+  std::cout << text;
+  return exit_success;
+}
+
+}  // namespace
+
+CLI::App* add_scenes(CLI::App& app, Console& console, Action& action) {
+  CLI::App* command = app.add_subcommand("scenes", "List the built-in scenes, or print one");
+  auto name = std::make_shared<std::string>();
+  command->add_option("NAME", *name, "Print this scene's JSON");
+  add_console_options(*command, console);
+  command->footer(
+      "A printed scene is a good start for one of your own.\n"
+      "Examples:\n"
+      "  asperity scenes\n"
+      "  asperity scenes M_a-H_3 > mine.json");
+  command->callback([name, &console, &action] {
+    action = [name, &console] { return name->empty() ? list_scenes(console) : print_scene(*name); };
+  });
+  return command;
+}
+
+CLI::App* add_schema(CLI::App& app, Console& console, Action& action) {
+  CLI::App* command = app.add_subcommand("schema", "Print the JSON Schema of scene files");
+  add_console_options(*command, console, false);
+  command->footer(
+      "Every key with its unit, range and default. Editors complete and check scenes with it (\"$schema\": \"scene.schema.json\").\n"
+      "Example:\n"
+      "  asperity schema > scene.schema.json");
+  command->callback([&action] {
+    action = []() -> Result<int> {
+      std::cout << scene_schema_json();
+      return exit_success;
+    };
+  });
+  return command;
+}
+
+}  // namespace asperity::program

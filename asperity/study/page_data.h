@@ -1,0 +1,18 @@
+#pragma once
+// From a report to the data of its page. Private to study.
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "asperity/study/report.h"
+
+namespace asperity {
+
+/// The page's data in the units that it shows (mm, N, us, mJ); not-a-number becomes null. Columns must be equally long.
+nlohmann::json run_data(const RunReport& report);
+nlohmann::json compare_data(const CompareReport& report);
+
+/// Errors: bad_value when the columns of a series differ in length.
+Status check_series(const RunSeries& series, const std::string& place);
+
+}  // namespace asperity

@@ -1,0 +1,216 @@
+// The wide BVH against brute force, plain kernels against AVX2, the certificate of the patch against both.
+
+#include "asperity/geometry/bvh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "asperity/core/rng.h"
+#include "asperity/geometry/generators.h"
+#include "asperity/geometry/triangle_index.h"
+#include "tests/geometry/random_meshes.h"
+
+namespace asperity {
+namespace {
+
+Vec3 random_point(Rng& rng, const Box& box) {
+  return {rng.uniform(box.lower.x(), box.upper.x()), rng.uniform(box.lower.y(), box.upper.y()),
+          rng.uniform(box.lower.z(), box.upper.z())};
+}
+
+double brute_squared_distance(const TriangleMesh& mesh, const Vec3& p) {
+  double best = infinity;
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto [a, b, c] = mesh.corners(face);
+    best = std::min(best, closest_point_on_triangle(p, a, b, c).squared_distance);
+  }
+  return best;
+}
+
+/// Every kind of random mesh of the octree's tests, the same oracle.
+std::vector<TriangleMesh> meshes() {
+  std::vector<TriangleMesh> all;
+  for (int kind = 0; kind < 8; ++kind) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      auto mesh = TriangleMesh::build(test::mesh_of_kind(kind, seed));
+      if (mesh) all.push_back(std::move(mesh).value());
+    }
+  }
+  return all;
+}
+
+TEST(Bvh, ClosestEqualsBruteForceOnEveryKindOfMesh) {
+  Rng rng(1);
+  for (const TriangleMesh& mesh : meshes()) {
+    for (const bool plain : {false, true}) {
+      const Bvh bvh = Bvh::build(mesh, {plain});
+      const double size = mesh.bounds().diagonal();
+      for (int i = 0; i < 200; ++i) {
+        const Vec3 p = random_point(rng, mesh.bounds().grown(i % 3 == 0 ? 3.0 * size : 0.1 * size));
+        EXPECT_EQ(bvh.closest(p, infinity).point.squared_distance, brute_squared_distance(mesh, p));
+      }
+    }
+  }
+}
+
+TEST(Bvh, ClosestKeepsItsBound) {
+  Rng rng(2);
+  const TriangleMesh mesh = TriangleMesh::build(random_closed_mesh(3, 3, 0.05, 0.4)).value();
+  const Bvh bvh = Bvh::build(mesh);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 p = random_point(rng, mesh.bounds().grown(0.05));
+    const double distance = std::sqrt(brute_squared_distance(mesh, p));
+    EXPECT_EQ(bvh.closest(p, 0.999 * distance).face, no_index);
+    EXPECT_NE(bvh.closest(p, 1.001 * distance).face, no_index);
+  }
+}
+
+TEST(Bvh, FirstHitEqualsBruteForce) {
+  Rng rng(3);
+  for (const TriangleMesh& mesh : meshes()) {
+    const Bvh bvh = Bvh::build(mesh);
+    for (int i = 0; i < 200; ++i) {
+      const Box around = mesh.bounds().grown(0.2 * mesh.bounds().diagonal());
+      const Segment segment{random_point(rng, around), random_point(rng, around)};
+      double first = infinity;
+      for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+        const auto [a, b, c] = mesh.corners(face);
+        double t = 0.0;
+        if (segment_triangle_intersection(segment, a, b, c, t)) first = std::min(first, t);
+      }
+      const FirstHit hit = bvh.first_hit(segment);
+      EXPECT_EQ(hit.face == no_index, std::isinf(first));
+      if (hit.face != no_index) EXPECT_EQ(hit.t, first);
+    }
+  }
+}
+
+TEST(Bvh, BoxQueryFindsEveryTriangleWhoseBoxMeets) {
+  Rng rng(4);
+  for (const TriangleMesh& mesh : meshes()) {
+    const Bvh bvh = Bvh::build(mesh);
+    for (int i = 0; i < 50; ++i) {
+      Box box;
+      box.include(random_point(rng, mesh.bounds()));
+      box.include(random_point(rng, mesh.bounds()));
+      std::vector<int> found(mesh.triangles().size(), 0);
+      bvh.for_each_in_box(box, [&](std::uint32_t face) { ++found[face]; });
+      for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+        Box own;
+        for (const Vec3& corner : mesh.corners(face)) own.include(corner);
+        const bool meets = (own.lower.array() <= box.upper.array()).all() && (box.lower.array() <= own.upper.array()).all();
+        if (meets) EXPECT_EQ(found[face], 1) << "face " << face;
+        EXPECT_LE(found[face], 1);
+      }
+    }
+  }
+}
+
+// The certificate: a coherent walk answers as brute force does at every step, for any length of step.
+TEST(TriangleIndex, CoherentClosestIsExactOnRandomWalks) {
+  Rng rng(5);
+  for (TriangleMesh& mesh : meshes()) {
+    const double size = mesh.bounds().diagonal();
+    const Box around = mesh.bounds().grown(0.1 * size);
+    for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
+      const TriangleIndex index = TriangleIndex::build(mesh, structure);
+      TrianglePatch patch;
+      Vec3 p = random_point(rng, around);
+      for (int i = 0; i < 150; ++i) {
+        const double reach = size * std::pow(10.0, rng.uniform(-5.0, -0.5));
+        p = (p + reach * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0))).cwiseMax(around.lower).cwiseMin(around.upper);
+        const double expected = brute_squared_distance(index.mesh(), p);
+        ASSERT_EQ(index.closest(p, infinity, patch).distance, std::sqrt(expected));
+      }
+    }
+  }
+}
+
+TEST(TriangleIndex, PatchOfAnotherMeshIsNeverRead) {
+  const TriangleIndex a = TriangleIndex::build(TriangleMesh::build(icosphere(3, 0.05)).value());
+  const TriangleIndex b = TriangleIndex::build(TriangleMesh::build(icosphere(2, 0.02)).value());
+  TrianglePatch patch;
+  const Vec3 p(0.0, 0.03, 0.01);
+  EXPECT_EQ(a.closest(p, infinity, patch).distance, a.closest(p, infinity).distance);
+  EXPECT_EQ(b.closest(p, infinity, patch).distance, b.closest(p, infinity).distance);
+}
+
+// First touch of a moving ball, against small steps of the closest distance.
+TEST(TriangleIndex, SweepStopsWhereTheBallFirstTouches) {
+  Rng rng(6);
+  for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
+    const TriangleIndex index = TriangleIndex::build(TriangleMesh::build(random_closed_mesh(9, 2, 0.05, 0.5)).value(), structure);
+    const Box around = index.mesh().bounds().grown(0.03);
+    int hits = 0;
+    for (int i = 0; i < 400; ++i) {
+      const double radius = i % 2 == 0 ? 0.0 : rng.uniform(0.0, 0.01);
+      const Segment motion{random_point(rng, around), random_point(rng, around)};
+      if (index.closest(motion.from, infinity).distance < radius + 1e-4) continue;
+      TrianglePatch patch;
+      const SweptHit hit = index.sweep(motion, radius, Sides::both, patch);
+      const double end = hit.hit ? hit.t : 1.0;
+      for (int j = 0; j <= 400; ++j) {
+        const Vec3 x = motion.from + (end * j / 400.0) * (motion.to - motion.from);
+        ASSERT_GE(index.closest(x, infinity).distance, radius - 1e-12) << "passed a triangle before the hit";
+      }
+      if (!hit.hit) continue;
+      ++hits;
+      const Vec3 x = motion.from + hit.t * (motion.to - motion.from);
+      EXPECT_NEAR(index.closest(x, infinity).distance, radius, 2.0 * index.skin());
+    }
+    EXPECT_GT(hits, 100);
+  }
+}
+
+TEST(TriangleIndex, ContactsAreThePlanesWithinTouch) {
+  const TriangleIndex index = TriangleIndex::build(TriangleMesh::build(box_mesh(Vec3(0.1, 0.1, 0.1))).value());
+  for (const double radius : {0.0, 0.003}) {
+    const auto count = [&](const Vec3& position, Sides sides) {
+      TrianglePatch patch;
+      ContactSet contacts;
+      index.contacts(position, radius, sides, patch, contacts);
+      return contacts.size();
+    };
+    const double in = 0.05 - radius - index.skin();
+    EXPECT_EQ(count(Vec3(in, 0.01, 0.004), Sides::both), 1u);
+    EXPECT_EQ(count(Vec3(in, in, 0.004), Sides::both), 2u);
+    EXPECT_EQ(count(Vec3(in, in, in), Sides::both), 3u);
+    EXPECT_EQ(count(Vec3(in, in, in), Sides::front), 0u) << "from behind";
+    EXPECT_EQ(count(Vec3(0.05 + radius + index.skin(), 0.01, 0.004), Sides::front), 1u);
+    EXPECT_EQ(count(Vec3(0.06, 0.01, 0.004), Sides::front), 0u);
+  }
+}
+
+TEST(SimdKernels, PlainAndBestAgree) {
+  Rng rng(7);
+  for (int i = 0; i < 2000; ++i) {
+    TrianglesOf8 triangles;
+    BoxesOf8 boxes;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int lane = 0; lane < 8; ++lane) {
+        triangles.corner[axis][lane] = static_cast<float>(rng.uniform(-1.0, 1.0));
+        triangles.edge1[axis][lane] = static_cast<float>(rng.uniform(-0.3, 0.3));
+        triangles.edge2[axis][lane] = lane == 3 ? 2.0F * triangles.edge1[axis][lane] : static_cast<float>(rng.uniform(-0.3, 0.3));
+        boxes.lower[axis][lane] = static_cast<float>(rng.uniform(-1.0, 0.0));
+        boxes.upper[axis][lane] = boxes.lower[axis][lane] + static_cast<float>(rng.uniform(0.0, 1.0));
+      }
+    }
+    const float point[3] = {static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0))};
+    DistancesOf8 plain;
+    DistancesOf8 best;
+    plain_kernels().triangles(triangles, point, plain);
+    best_kernels().triangles(triangles, point, best);
+    float plain_boxes[8];
+    float best_boxes[8];
+    plain_kernels().boxes(boxes, point, 0.5F, plain_boxes);
+    best_kernels().boxes(boxes, point, 0.5F, best_boxes);
+    for (int lane = 0; lane < 8; ++lane) {
+      EXPECT_NEAR(plain.distance[lane], best.distance[lane], 2e-6F);
+      EXPECT_NEAR(plain_boxes[lane], best_boxes[lane], 2e-6F);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace asperity

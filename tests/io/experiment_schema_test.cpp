@@ -1,0 +1,170 @@
+// The published schema against the built-in scenes and against what the reader reads.
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <valijson/adapters/nlohmann_json_adapter.hpp>
+#include <valijson/schema.hpp>
+#include <valijson/schema_parser.hpp>
+#include <valijson/validation_results.hpp>
+#include <valijson/validator.hpp>
+
+#include "asperity/io/scene_json.h"
+#include "tests/io/experiment_fixture.h"
+
+namespace asperity {
+namespace {
+
+using nlohmann::json;
+
+class ExperimentSchema : public ExperimentTest {
+ protected:
+  static json schema() { return json::parse(scene_schema_json()); }
+
+  /// What the schema has against `scene`; empty when it is valid.
+  static std::string violations(const std::string& scene) {
+    const json document = schema();
+    valijson::Schema compiled;
+    valijson::SchemaParser parser;
+    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(document), compiled);
+    const json instance = json::parse(scene);
+    valijson::Validator validator;
+    valijson::ValidationResults results;
+    if (validator.validate(compiled, valijson::adapters::NlohmannJsonAdapter(instance), &results)) return {};
+    std::string text;
+    valijson::ValidationResults::Error error;
+    while (results.popError(error)) {
+      for (const std::string& step : error.context) text += step;
+      text += ": " + error.description + "\n";
+    }
+    return text.empty() ? "invalid" : text;
+  }
+
+  static std::string definition_name(std::string_view object) {
+    std::string name(object);
+    for (char& c : name) c = c == ' ' ? '_' : c;
+    return name;
+  }
+  static json properties_of(const json& document, std::string_view object) {
+    return object == "scene" ? document["properties"] : document["definitions"][definition_name(object)]["properties"];
+  }
+};
+
+TEST_F(ExperimentSchema, BuiltinScenesAreValid) {
+  for (const BuiltinScene& scene : builtin_scenes()) EXPECT_EQ(violations(*builtin_scene_json(scene.name)), "") << scene.name;
+}
+
+TEST_F(ExperimentSchema, CanonicalCopiesAreValid) {
+  EXPECT_EQ(violations(good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height_range":[0,"1mm"]}}],"device":{"rate":500}})").canonical_json), "");
+  for (const BuiltinScene& scene : builtin_scenes()) EXPECT_EQ(violations(good(*builtin_scene_json(scene.name)).canonical_json), "") << scene.name;
+}
+
+TEST_F(ExperimentSchema, ItRefusesWhatTheReaderRefuses) {
+  for (const char* scene : {
+           R"({})",
+           R"({"surfaces":[]})",
+           R"({"surfaces":[{"mesh":3}]})",
+           R"({"surfaces":[{"mesh":"a.obj","colour":"red"}]})",
+           R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})",
+           R"({"surfaces":[{"mesh":"a.obj","material":{"stiffness":0}}]})",
+           R"({"surfaces":[{"mesh":"a.obj","law":{"rho":0.5}}]})",
+           R"({"surfaces":[{"mesh":"a.obj"}],"device":"omega.8"})",
+           R"({"surfaces":[{"mesh":"a.obj"}],"stroke":{"type":"polyline","points":[[0,0,0]]}})",
+       }) {
+    EXPECT_NE(violations(scene), "") << scene;
+    EXPECT_FALSE(parse(scene).ok()) << scene;
+  }
+}
+
+TEST_F(ExperimentSchema, ReaderAndSchemaKnowTheSameKeys) {
+  const json document = schema();
+  std::set<std::string> objects;
+  for (const SceneObjectKeys& entry : scene_object_keys()) {
+    if (entry.object != "scene") objects.insert(definition_name(entry.object));
+    const json properties = properties_of(document, entry.object);
+    ASSERT_TRUE(properties.is_object()) << entry.object;
+    std::set<std::string> described;
+    for (const auto& item : properties.items()) described.insert(item.key());
+    EXPECT_EQ(described, std::set<std::string>(entry.keys.begin(), entry.keys.end())) << entry.object;
+  }
+  for (const auto& item : document["definitions"].items()) EXPECT_TRUE(objects.count(item.key())) << item.key();
+}
+
+TEST_F(ExperimentSchema, EveryKeyIsDescribed) {
+  const json document = schema();
+  for (const SceneObjectKeys& entry : scene_object_keys()) {
+    for (const auto& item : properties_of(document, entry.object).items()) {
+      EXPECT_TRUE(item.value().contains("description") && item.value()["description"].get<std::string>().size() > 8)
+          << entry.object << "." << item.key();
+    }
+  }
+}
+
+TEST_F(ExperimentSchema, NamesAreThoseOfTheProgram) {
+  const json document = schema();
+  EXPECT_EQ(document["definitions"]["device"]["properties"]["profile"]["enum"], json(device_profile_names()));
+  EXPECT_EQ(document["definitions"]["hand"]["properties"]["preset"]["enum"], json(hand_preset_names()));
+  EXPECT_EQ(document["definitions"]["law"]["properties"]["type"]["enum"], json(law_names()));
+}
+
+/// A scene in which an object of one kind stands at `pointer`.
+struct Host {
+  std::string_view object;
+  const char* pointer;
+  const char* scene;
+};
+
+// Every kind of object, in as many variants as it takes for each of its keys to be read in one of them.
+const Host hosts[] = {
+    {"scene", "", R"({"surfaces":[{"mesh":{"generator":"box"}}]})"},
+    {"probe", "/probe", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{}})"},
+    {"ideal probe", "/probe/ideal", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{"ideal":{}}})"},
+    {"dynamic probe", "/probe/dynamic", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{"dynamic":{}}})"},
+    {"device", "/device", R"({"surfaces":[{"mesh":{"generator":"box"}}],"device":{}})"},
+    {"hand", "/hand", R"({"surfaces":[{"mesh":{"generator":"box"}}],"hand":{}})"},
+    {"surface", "/surfaces/0", R"({"surfaces":[{"mesh":"sphere.ply"}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"icosphere"}}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"M_b"}}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"M_e"}}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"plane"}}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"box"}}]})"},
+    {"mesh generator", "/surfaces/0/mesh", R"({"surfaces":[{"mesh":{"generator":"random"}}]})"},
+    {"pose", "/surfaces/0/pose", R"({"surfaces":[{"mesh":{"generator":"box"},"pose":{}}]})"},
+    {"coat", "/surfaces/0/coat", R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","normal_map":"normal.png"}}]})"},
+    {"coat", "/surfaces/0/coat", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png"}}]})"},
+    {"height generator", "/surfaces/0/coat/height_map", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_1"}}}]})"},
+    {"height generator", "/surfaces/0/coat/height_map", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_4"}}}]})"},
+    {"law", "/surfaces/0/law", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{}}]})"},
+    {"law", "/surfaces/0/law", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"height-field"}}]})"},
+    {"blend map", "/surfaces/0/law/blend", R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"blend":{"image":"map.png"}}}]})"},
+    {"material", "/surfaces/0/material", R"({"surfaces":[{"mesh":{"generator":"box"},"material":{}}]})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{}})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"normal_force":1}})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"type":"raster"}})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"type":"spiral"}})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"type":"polyline","points":[["0%","100%","0%"],["100%","100%","0%"]]}})"},
+    {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"type":"recorded","path":"path.csv"}})"},
+};
+
+TEST_F(ExperimentSchema, EveryKeyIsReallyRead) {
+  write("path.csv", "time,x,y,z\n0,0,0.05,0\n1,0.01,0.05,0\n");
+  for (const SceneObjectKeys& entry : scene_object_keys()) {
+    for (const std::string& key : entry.keys) {
+      bool read = false;
+      for (const Host& host : hosts) {
+        if (host.object != entry.object || read) continue;
+        json scene = json::parse(host.scene);
+        ASSERT_TRUE(parse(scene.dump()).ok()) << host.scene << parse(scene.dump()).error().message();
+        // No key takes an array of an array of nothing.
+        scene[json::json_pointer(host.pointer)][key] = json::array({json::array()});
+        const Result<Experiment> result = parse(scene.dump());
+        ASSERT_FALSE(result.ok()) << entry.object << "." << key << " is accepted and ignored";
+        const Error& error = result.error();
+        read = error.code != ErrorCode::bad_key && error.place.find(key) != std::string::npos;
+      }
+      EXPECT_TRUE(read) << entry.object << "." << key << " is read in no scene";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace asperity

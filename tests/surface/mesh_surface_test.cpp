@@ -1,0 +1,109 @@
+#include "asperity/surface/mesh_surface.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/surface/coats.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+TEST(MeshSurfaceEval, is_the_exact_signed_distance_of_a_box) {
+  const Vec3 half(0.015, 0.01, 0.005);
+  const auto box = bare(box_mesh(2.0 * half));
+  Rng rng(1);
+  Hint hint;
+  for (int i = 0; i < 3000; ++i) {
+    const Vec3 p = random_vector(rng, 0.02);
+    const Vec3 over = p.cwiseAbs() - half;
+    const double expected = over.cwiseMax(0.0).norm() + std::min(over.maxCoeff(), 0.0);
+    const FieldSample sample = box->eval(p, hint);
+    ASSERT_NEAR(sample.value, expected, 1e-15) << p.transpose();
+    ASSERT_NEAR(sample.gradient.norm(), 1.0, 1e-12);
+    ASSERT_EQ(sample.height, 0.0);
+  }
+}
+
+TEST(MeshSurfaceEval, gradient_agrees_with_finite_differences) {
+  const auto surface = bare(random_closed_mesh(6, 2, 0.02, 0.4));
+  Rng rng(2);
+  Hint hint;
+  int checked = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 p = random_vector(rng, 0.03);
+    const FieldSample here = surface->eval(p, hint);
+    const double h = 1e-8;
+    Vec3 expected;
+    for (int k = 0; k < 3; ++k) {
+      expected[k] = (surface->eval(p + h * Vec3::Unit(k), hint).value - surface->eval(p - h * Vec3::Unit(k), hint).value) / (2.0 * h);
+    }
+    // The medial axis has measure zero; there the two sides of the difference see different feet.
+    if (std::abs(expected.norm() - 1.0) > 1e-4) continue;
+    ++checked;
+    ASSERT_LT((expected - here.gradient).norm(), 1e-4);
+  }
+  EXPECT_GT(checked, 950);
+}
+
+TEST(MeshSurfaceEval, on_a_face_the_gradient_is_the_faces_normal) {
+  const auto surface = bare(plane_grid(0.02, 0.02, 2, 2));
+  Hint hint;
+  const FieldSample sample = surface->eval(Vec3(0.001, 0.002, 0.0), hint);
+  EXPECT_EQ(sample.value, 0.0);
+  EXPECT_EQ(sample.gradient, Vec3(0.0, 0.0, 1.0));
+}
+
+TEST(Pseudonormal, tells_inside_from_outside_at_edges_and_corners_where_face_normals_do_not) {
+  // A spike: far beyond the tip some faces see the point from behind.
+  const TriangleMesh mesh = mesh_of(random_closed_mesh(12, 1, 1.0, 0.8));
+  Rng rng(4);
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 corner = pseudonormal(mesh, face, Vec3::Unit(k));
+      EXPECT_EQ(corner, mesh.vertex_normal(mesh.triangles()[face][static_cast<std::size_t>(k)]));
+      Vec3 barycentric = Vec3::Constant(0.5);
+      barycentric[k] = 0.0;
+      const std::uint32_t other = mesh.neighbour(face, (k + 1) % 3);
+      EXPECT_LT((pseudonormal(mesh, face, barycentric) - mesh.face_normal(face) - mesh.face_normal(other)).norm(), 1e-15);
+    }
+    EXPECT_EQ(pseudonormal(mesh, face, random_barycentric(rng, 0.01)), mesh.face_normal(face));
+  }
+}
+
+TEST(InterpolatedNormal, is_unit_and_the_vertex_normal_at_corners) {
+  const TriangleMesh mesh = mesh_of(icosphere(1, 1.0));
+  Rng rng(8);
+  for (int i = 0; i < 300; ++i) {
+    const std::uint32_t face = random_face(rng, mesh);
+    const Vec3 barycentric = random_barycentric(rng);
+    EXPECT_NEAR(interpolated_normal(mesh, face, barycentric).norm(), 1.0, 1e-12);
+    // On a sphere it points away from the centre.
+    EXPECT_GT(interpolated_normal(mesh, face, barycentric).dot(point_on(mesh, face, barycentric).normalized()), 0.99);
+    EXPECT_LT((interpolated_normal(mesh, face, Vec3::UnitX()) - mesh.vertex_normal(mesh.triangles()[face][0])).norm(), 1e-6);
+  }
+}
+
+TEST(MeshSurface, natural_sides_are_front_for_closed_meshes_alone) {
+  EXPECT_EQ(bare(icosphere(1, 1.0))->natural_sides(), Sides::front);
+  EXPECT_EQ(bare(trial_mesh_a())->natural_sides(), Sides::both);
+  EXPECT_EQ(bare(trial_mesh_e())->natural_sides(), Sides::both);
+}
+
+TEST(MeshSurface, answers_the_same_with_and_without_a_hint) {
+  const auto surface = bare(random_closed_mesh(2, 3, 0.02, 0.4));
+  Rng rng(14);
+  Hint kept;
+  Vec3 p = random_vector(rng, 0.02);
+  for (int i = 0; i < 2000; ++i) {
+    p += random_vector(rng, 2e-4);
+    Hint fresh;
+    const FieldSample a = surface->eval(p, kept);
+    const FieldSample b = surface->eval(p, fresh);
+    ASSERT_EQ(a.value, b.value);
+    ASSERT_EQ(a.gradient, b.gradient);
+  }
+}
+
+}  // namespace
+}  // namespace asperity
