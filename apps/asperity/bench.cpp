@@ -69,7 +69,8 @@ Latency measure_warm(const Experiment& experiment, const std::vector<TraceRecord
 }
 
 /// Ticks spread over the stroke's contact; each is preceded by the tick before it, unmeasured, and a sweep.
-Latency measure_cold(const Experiment& experiment, const std::vector<TraceRecord>& records, int ticks, const Progress& progress) {
+Latency measure_cold(const Experiment& experiment, const std::vector<TraceRecord>& records, int ticks,
+                     const Progress& progress) {
   std::vector<double> seconds;
   CacheSweep sweep;
   ProxyState state;
@@ -88,29 +89,40 @@ Latency measure_cold(const Experiment& experiment, const std::vector<TraceRecord
 }
 
 Json json_of(const Latency& latency) {
-  return Json{{"ticks", latency.ticks}, {"p50_s", latency.p50}, {"p99_s", latency.p99}, {"p999_s", latency.p999}, {"max_s", latency.max}};
+  return Json{{"ticks", latency.ticks},
+              {"p50_s", latency.p50},
+              {"p99_s", latency.p99},
+              {"p999_s", latency.p999},
+              {"max_s", latency.max}};
 }
 
 void print_row(const char* name, const Latency& latency) {
-  std::cout << fmt::format("{:<6}{:>10}{:>12}{:>12}{:>12}{:>12}\n", name, latency.ticks, format_seconds(latency.p50), format_seconds(latency.p99),
-                           format_seconds(latency.p999), format_seconds(latency.max));
+  std::cout << fmt::format("{:<6}{:>10}{:>12}{:>12}{:>12}{:>12}\n", name, latency.ticks, format_seconds(latency.p50),
+                           format_seconds(latency.p99), format_seconds(latency.p999), format_seconds(latency.max));
 }
 
 Result<int> bench(const BenchOptions& options, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
   ASPERITY_TRY(const RunResult run, run_experiment(experiment, {}, progress));
-  if (run.records.empty()) return Error{ErrorCode::bad_value, "has no ticks", experiment.name, "stroke", "a stroke that takes time"};
+  if (run.records.empty())
+    return Error{ErrorCode::bad_value, "has no ticks", experiment.name, "stroke", "a stroke that takes time"};
   const Latency warm = measure_warm(experiment, run.records, options.ticks);
   const Latency cold = measure_cold(experiment, run.records, options.cold_ticks, progress);
   const ReportOrigin origin = report_origin(experiment, console);
   if (console.json) {
-    console.print(Json{{"scene", experiment.name},     {"law", law_names_of(experiment.scene)}, {"machine", origin.machine},
-                       {"date", origin.date},          {"command", origin.command},             {"memory_bytes", experiment.scene.memory_bytes()},
-                       {"warm", json_of(warm)},        {"cold", json_of(cold)}});
+    console.print(Json{{"scene", experiment.name},
+                       {"law", law_names_of(experiment.scene)},
+                       {"machine", origin.machine},
+                       {"date", origin.date},
+                       {"command", origin.command},
+                       {"memory_bytes", experiment.scene.memory_bytes()},
+                       {"warm", json_of(warm)},
+                       {"cold", json_of(cold)}});
     return exit_success;
   }
-  std::cout << fmt::format("scene {}, law {}, {:.2f} MB\n", experiment.name, law_names_of(experiment.scene), static_cast<double>(experiment.scene.memory_bytes()) * 1e-6);
+  std::cout << fmt::format("scene {}, law {}, {:.2f} MB\n", experiment.name, law_names_of(experiment.scene),
+                           static_cast<double>(experiment.scene.memory_bytes()) * 1e-6);
   std::cout << fmt::format("{:<6}{:>10}{:>12}{:>12}{:>12}{:>12}\n", "", "ticks", "p50", "p99", "p99.9", "max");
   print_row("warm", warm);
   print_row("cold", cold);
@@ -125,16 +137,21 @@ CLI::App* add_bench(CLI::App& app, Console& console, Action& action) {
   auto options = std::make_shared<BenchOptions>();
   add_scene_options(*command, options->scene);
   command->add_option("--law", options->scene.law, "Of every surface")->group("Touch");
-  command->add_option("--ticks", options->ticks, "Warm ticks to measure")->check(CLI::Range(1, 100000000))->capture_default_str();
-  command->add_option("--cold-ticks", options->cold_ticks, "Ticks measured after 64 MB have been swept through the caches")
-      ->check(CLI::Range(1, 1000000))->capture_default_str();
+  command->add_option("--ticks", options->ticks, "Warm ticks to measure")
+      ->check(CLI::Range(1, 100000000))
+      ->capture_default_str();
+  command
+      ->add_option("--cold-ticks", options->cold_ticks, "Ticks measured after 64 MB have been swept through the caches")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   add_console_options(*command, console);
   command->footer(
       "The ticks are those of the scene's own stroke. Times include one reading of the clock (some 20 ns).\n"
       "Examples:\n"
       "  asperity bench icosphere\n"
       "  asperity bench bunny.obj --law god-object --ticks 1000000 --json");
-  command->callback([options, &console, &action] { action = [options, &console] { return bench(*options, console); }; });
+  command->callback(
+      [options, &console, &action] { action = [options, &console] { return bench(*options, console); }; });
   return command;
 }
 

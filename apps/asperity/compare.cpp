@@ -54,7 +54,9 @@ Result<Column> run_law(const Experiment& experiment, const std::string& name, co
 }
 
 Json law_json_of(const Column& column) {
-  return Json{{"law", column.entry.law}, {"force_hash", format_hash(column.hash)}, {"metrics", Json::parse(metrics_json(column.entry.metrics))}};
+  return Json{{"law", column.entry.law},
+              {"force_hash", format_hash(column.hash)},
+              {"metrics", Json::parse(metrics_json(column.entry.metrics))}};
 }
 
 std::string number(double value, const char* format) {
@@ -63,20 +65,23 @@ std::string number(double value, const char* format) {
 
 void print_table(const Experiment& experiment, const std::vector<Column>& columns) {
   std::cout << fmt::format("scene {}: {}\n", experiment.name, setup_facts(experiment).back().value);
-  std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", "law", "direction", "height", "jump", "energy/loop", "update p50");
+  std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", "law", "direction", "height", "jump",
+                           "energy/loop", "update p50");
   for (const Column& column : columns) {
     const RunMetrics& m = column.entry.metrics;
     constexpr double degrees = 57.29577951308232;
-    std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", column.entry.law, number(m.direction.mean * degrees, "{:.2f} deg"),
-                             number(m.height.relative_error * 100.0, "{:.2f} %"), number(m.force.largest_jump, "{:.3g} N"),
-                             number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"), format_seconds(m.update.p50));
+    std::cout << fmt::format(
+        "{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", column.entry.law, number(m.direction.mean * degrees, "{:.2f} deg"),
+        number(m.height.relative_error * 100.0, "{:.2f} %"), number(m.force.largest_jump, "{:.3g} N"),
+        number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"), format_seconds(m.update.p50));
   }
 }
 
 Result<int> compare(const CompareOptions& options, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress, !options.one_way));
-  const fs::path folder = options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
+  const fs::path folder =
+      options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
   std::vector<Column> columns;
   const std::vector<std::string> laws = options.laws.empty() ? default_laws(experiment.scene) : options.laws;
   // Every pair is checked before anything is run or written.
@@ -91,25 +96,32 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     ASPERITY_TRY(Column column, run_law(experiment, name, progress));
     columns.push_back(std::move(column));
   }
-  Json document{{"program", program_name()}, {"command", console.command_line}, {"scene", experiment.name}, {"notes", experiment.notes}};
+  Json document{{"program", program_name()},
+                {"command", console.command_line},
+                {"scene", experiment.name},
+                {"notes", experiment.notes}};
   for (const Column& column : columns) document["laws"].push_back(law_json_of(column));
   if (!options.no_report) {
     CompareReport report;
     report.origin = report_origin(experiment, console);
     report.setup = setup_facts(experiment);
     for (const Column& column : columns) report.entries.push_back(column.entry);
-    ASPERITY_TRY(report.picture, render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
+    ASPERITY_TRY(report.picture,
+                 render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
     ASPERITY_CHECK(write_compare_report(folder / "report.html", report));
     document["files"]["report"] = (folder / "report.html").string();
   }
   document["files"]["numbers"] = (folder / "compare.json").string();
-  ASPERITY_CHECK(write_file_atomically(folder / "compare.json", document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
+  ASPERITY_CHECK(write_file_atomically(folder / "compare.json",
+                                       document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"));
   for (const std::string& note : experiment.notes) console.note(note);
   if (console.json) {
     console.print(document);
   } else {
     print_table(experiment, columns);
-    std::cout << (options.no_report ? "numbers " + (folder / "compare.json").string() : "report  " + (folder / "report.html").string()) << '\n';
+    std::cout << (options.no_report ? "numbers " + (folder / "compare.json").string()
+                                    : "report  " + (folder / "report.html").string())
+              << '\n';
   }
   return exit_success;
 }
@@ -120,19 +132,25 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
   CLI::App* command = app.add_subcommand("compare", "Put several laws side by side on one scene and stroke");
   auto options = std::make_shared<CompareOptions>();
   add_scene_options(*command, options->scene);
-  command->add_option("--laws", options->laws, "Laws, separated by commas; default: those that suit the scene")->delimiter(',');
-  command->add_flag("--one-way", options->one_way, "Follow the stroke as the scene says; without it an open stroke goes there and back, so that energy a loop can be told");
+  command->add_option("--laws", options->laws, "Laws, separated by commas; default: those that suit the scene")
+      ->delimiter(',');
+  command->add_flag("--one-way", options->one_way,
+                    "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
+                    "energy a loop can be told");
   command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE-compare");
   command->add_flag("--no-report", options->no_report, "Numbers only: no picture, no page");
   add_console_options(*command, console);
   command->footer(
-      "direction: mean angle between the force and the relief's normal. height: RMS of followed height against the true relief, of what was\n"
-      "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: time of one tick.\n"
+      "direction: mean angle between the force and the relief's normal. height: RMS of followed height against the "
+      "true relief, of what was\n"
+      "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "
+      "time of one tick.\n"
       "Examples:\n"
       "  asperity compare M_a-H_3 --laws force-shading,height-field,mesostructure\n"
       "  asperity compare groove --laws mesostructure-literal,mesostructure\n"
       "  asperity compare bunny.obj --relief rock.png --height 1mm --json");
-  command->callback([options, &console, &action] { action = [options, &console] { return compare(*options, console); }; });
+  command->callback(
+      [options, &console, &action] { action = [options, &console] { return compare(*options, console); }; });
   return command;
 }
 

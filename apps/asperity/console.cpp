@@ -55,13 +55,17 @@ Progress Console::progress() const {
   return [line](std::string_view what, double fraction) { line->show(what, fraction); };
 }
 
-void Console::note(const std::string& text) const { std::cerr << "note: " << text << '\n'; }
+void Console::note(const std::string& text) const {
+  std::cerr << "note: " << text << '\n';
+}
 
 void Console::print(const Json& document) const {
   std::cout << document.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
 }
 
-std::string program_name() { return "asperity " ASPERITY_VERSION; }
+std::string program_name() {
+  return "asperity " ASPERITY_VERSION;
+}
 
 void add_console_options(CLI::App& command, Console& console, bool with_json) {
   if (with_json) command.add_flag("--json", console.json, "Answer on standard output as JSON, for programs");

@@ -42,18 +42,23 @@ void amplitude_line(const Coat& coat, const Experiment& experiment, double stiff
   if (range == 0.0) {
     lines.push_back("the coat has no relief: it feels like the bare mesh");
   } else if (force < noticed_force) {
-    lines.push_back(fmt::format("the relief of {} changes the force by {:.3g} N at {:g} N/mm, less than the {:g} N that are noticed: magnify it {:.0f} times or more",
-                                format_length(range), force, stiffness * 1e-3, noticed_force, std::ceil(least / range)));
+    lines.push_back(
+        fmt::format("the relief of {} changes the force by {:.3g} N at {:g} N/mm, less than the {:g} N that are "
+                    "noticed: magnify it {:.0f} times or more",
+                    format_length(range), force, stiffness * 1e-3, noticed_force, std::ceil(least / range)));
   } else {
-    lines.push_back(fmt::format("the relief of {} changes the force by {:.3g} N at {:g} N/mm; heights of {} are just noticed ({:g} N)", format_length(range),
-                                force, stiffness * 1e-3, format_length(least), noticed_force));
+    lines.push_back(fmt::format(
+        "the relief of {} changes the force by {:.3g} N at {:g} N/mm; heights of {} are just noticed ({:g} N)",
+        format_length(range), force, stiffness * 1e-3, format_length(least), noticed_force));
   }
   const double step = coat.maps().heights().quantisation_step();
   if (step * stiffness > noticed_force) {
-    lines.push_back(fmt::format("the map's own steps of {} can be felt ({:.3g} N): a map of 16 bits would be smooth", format_length(step), step * stiffness));
+    lines.push_back(fmt::format("the map's own steps of {} can be felt ({:.3g} N): a map of 16 bits would be smooth",
+                                format_length(step), step * stiffness));
   }
   if (range > 0.0 && force > experiment.device.max_force) {
-    lines.push_back(fmt::format("the full relief asks for more than the {:g} N of {}", experiment.device.max_force, experiment.device.name));
+    lines.push_back(fmt::format("the full relief asks for more than the {:g} N of {}", experiment.device.max_force,
+                                experiment.device.name));
   }
 }
 
@@ -65,17 +70,22 @@ void detail_lines(const Coat& coat, const Experiment& experiment, std::vector<st
   const double least = std::max(by_encoder, by_rate);
   const double wave = 2.0 * texel;
   if (wave >= least) {
-    lines.push_back(fmt::format("every detail of the map is rendered: its shortest wave is {} (texel {}), {} resolves {} and {:g} Hz at {:.3g} mm/s {}",
-                                format_length(wave), format_length(texel), experiment.device.name, format_length(by_encoder), experiment.rate, speed * 1e3,
-                                format_length(by_rate)));
+    lines.push_back(
+        fmt::format("every detail of the map is rendered: its shortest wave is {} (texel {}), {} resolves {} and {:g} "
+                    "Hz at {:.3g} mm/s {}",
+                    format_length(wave), format_length(texel), experiment.device.name, format_length(by_encoder),
+                    experiment.rate, speed * 1e3, format_length(by_rate)));
   } else {
-    lines.push_back(fmt::format("waves shorter than {} are not felt as shapes: {} ({} steps, 25 a wave) resolves {}, {:g} Hz at {:.3g} mm/s resolves {}; the map goes down to {}",
-                                format_length(least), experiment.device.name, format_length(experiment.device.position_resolution), format_length(by_encoder),
-                                experiment.rate, speed * 1e3, format_length(by_rate), format_length(wave)));
+    lines.push_back(fmt::format(
+        "waves shorter than {} are not felt as shapes: {} ({} steps, 25 a wave) resolves {}, {:g} Hz at {:.3g} mm/s "
+        "resolves {}; the map goes down to {}",
+        format_length(least), experiment.device.name, format_length(experiment.device.position_resolution),
+        format_length(by_encoder), experiment.rate, speed * 1e3, format_length(by_rate), format_length(wave)));
   }
   const double passed = speed / wave;
-  lines.push_back(fmt::format("at {:.3g} mm/s up to {:.0f} of the shortest waves pass a second; {:g} Hz carries {:.0f} at 8 ticks each", speed * 1e3, passed,
-                              experiment.rate, experiment.rate / ticks_per_wave));
+  lines.push_back(fmt::format(
+      "at {:.3g} mm/s up to {:.0f} of the shortest waves pass a second; {:g} Hz carries {:.0f} at 8 ticks each",
+      speed * 1e3, passed, experiment.rate, experiment.rate / ticks_per_wave));
 }
 
 void crest_line(const Coat& coat, double force, double stiffness, std::vector<std::string>& lines) {
@@ -83,10 +93,14 @@ void crest_line(const Coat& coat, double force, double stiffness, std::vector<st
   const double depth = force / stiffness;
   const double share = share_of_sharp_crests(coat.maps().heights(), coat.texel_size(), depth);
   if (share > 0.0) {
-    lines.push_back(fmt::format("{:.2g} % of the map are crests sharper than the contact is deep ({} at {:.3g} N): there the force turns faster than the shape; press less or be stiffer",
-                                100.0 * share, format_length(depth), force));
+    lines.push_back(
+        fmt::format("{:.2g} % of the map are crests sharper than the contact is deep ({} at {:.3g} N): there the force "
+                    "turns faster than the shape; press less or be stiffer",
+                    100.0 * share, format_length(depth), force));
   } else {
-    lines.push_back(fmt::format("no crest is sharper than the contact is deep ({} at {:.3g} N): shapes are rendered faithfully", format_length(depth), force));
+    lines.push_back(
+        fmt::format("no crest is sharper than the contact is deep ({} at {:.3g} N): shapes are rendered faithfully",
+                    format_length(depth), force));
   }
 }
 
@@ -97,13 +111,15 @@ std::vector<std::string> feel_of(const Experiment& experiment, const Instance& i
   const double stiffness = instance.material.stiffness;
   const DeviceProfile& device = experiment.device;
   if (stiffness > device.max_stiffness) {
-    lines.push_back(fmt::format("{:g} N/m is stiffer than the {:g} N/m recommended for {}: it may buzz", stiffness, device.max_stiffness, device.name));
+    lines.push_back(fmt::format("{:g} N/m is stiffer than the {:g} N/m recommended for {}: it may buzz", stiffness,
+                                device.max_stiffness, device.name));
   } else {
     lines.push_back(fmt::format("{:g} N/m is within the {:g} N/m of {}", stiffness, device.max_stiffness, device.name));
   }
   const double force = pressing_force(experiment, stiffness);
   if (force > device.max_force) {
-    lines.push_back(fmt::format("the stroke presses with {:.3g} N, more than the {:g} N of {}: the force is cut", force, device.max_force, device.name));
+    lines.push_back(fmt::format("the stroke presses with {:.3g} N, more than the {:g} N of {}: the force is cut", force,
+                                device.max_force, device.name));
   }
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
     const Coat& coat = (*relief)->coat();

@@ -52,7 +52,8 @@ void mesh_facts(const TriangleMesh& mesh, Findings& found) {
   problem(r.misoriented_edges, "edges lie between triangles that face opposite ways");
   problem(r.nonmanifold_vertices, "vertices join more than one fan of triangles");
   constexpr double sliver = 100.0;
-  if (r.worst_aspect > sliver) found.problems.push_back(fmt::format("the thinnest triangle is {:.0f} times as long as high", r.worst_aspect));
+  if (r.worst_aspect > sliver)
+    found.problems.push_back(fmt::format("the thinnest triangle is {:.0f} times as long as high", r.worst_aspect));
   for (const std::string& note : mesh.notes()) found.problems.push_back(note);
 }
 
@@ -85,7 +86,8 @@ Result<Findings> inspect_scene(const InspectOptions& options, const Progress& pr
   found.fact("memory", fmt::format("{:.2f} MB", static_cast<double>(experiment.scene.memory_bytes()) * 1e-6));
   for (const std::string& note : experiment.notes) found.problems.push_back(note);
   for (const Instance& instance : experiment.scene.instances()) {
-    for (std::string& line : feel_of(experiment, instance)) found.felt.push_back(fmt::format("{}: {}", instance.name, line));
+    for (std::string& line : feel_of(experiment, instance))
+      found.felt.push_back(fmt::format("{}: {}", instance.name, line));
   }
   return found;
 }
@@ -98,12 +100,14 @@ Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& pro
   Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source));
   if (!mesh) return std::move(mesh).error().in_file(options.file);
   const Vec3 extent = mesh->bounds().extent();
-  found.fact("size", fmt::format("{:.4g} x {:.4g} x {:.4g} of the file's unit, which it does not state", extent.x(), extent.y(), extent.z()));
+  found.fact("size", fmt::format("{:.4g} x {:.4g} x {:.4g} of the file's unit, which it does not state", extent.x(),
+                                 extent.y(), extent.z()));
   mesh_facts(*mesh, found);
   for (const std::string& note : notes) found.problems.push_back(note);
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
   for (const ReportFact& fact : scene.facts) {
-    if (fact.name.starts_with("surface") || fact.name == "device") found.facts.push_back({"as a scene: " + fact.name, fact.value});
+    if (fact.name.starts_with("surface") || fact.name == "device")
+      found.facts.push_back({"as a scene: " + fact.name, fact.value});
   }
   found.felt = scene.felt;
   return found;
@@ -118,10 +122,12 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   Result<ChannelChoice> choice = choose_channel(image, Channel::automatic);
   if (!choice) return std::move(choice).error().in_file(options.file);
   found.fact("heights", fmt::format("{} channel: {}", to_string(choice->channel), choice->reason));
-  if (image.bits == 8) found.problems.push_back("8 bits: heights come in 255 steps, which can be felt as such on a tall relief");
+  if (image.bits == 8)
+    found.problems.push_back("8 bits: heights come in 255 steps, which can be felt as such on a tall relief");
   const std::vector<float> values = extract_channel(image, choice->channel);
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  found.fact("values used", fmt::format("{:.3f} to {:.3f} of white", static_cast<double>(*low), static_cast<double>(*high)));
+  found.fact("values used",
+             fmt::format("{:.3f} to {:.3f} of white", static_cast<double>(*low), static_cast<double>(*high)));
   if (*low == *high) found.problems.push_back("every pixel is equal: there is no relief in it");
   InspectOptions laid = options;
   laid.scene.scene = "M_a-H_0";
@@ -140,7 +146,8 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
 
 bool looks_like_image(const std::string& file) {
   std::string extension = fs::path(file).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
@@ -172,7 +179,11 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
   if (console.json) {
     Json facts = Json::object();
     for (const ReportFact& fact : found.facts) facts[fact.name] = fact.value;
-    console.print(Json{{"file", options.file}, {"kind", found.kind}, {"facts", facts}, {"to_know", found.problems}, {"felt", found.felt}});
+    console.print(Json{{"file", options.file},
+                       {"kind", found.kind},
+                       {"facts", facts},
+                       {"to_know", found.problems},
+                       {"felt", found.felt}});
   } else {
     print_findings(options.file, found);
   }
@@ -182,9 +193,11 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
 }  // namespace
 
 CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("inspect", "Say what a mesh, map, scene or trace is, what is wrong with it, and what can be felt of it");
+  CLI::App* command = app.add_subcommand(
+      "inspect", "Say what a mesh, map, scene or trace is, what is wrong with it, and what can be felt of it");
   auto options = std::make_shared<InspectOptions>();
-  command->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a scene, a built-in scene or a trace")->required();
+  command->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a scene, a built-in scene or a trace")
+      ->required();
   command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
   command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
   command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
@@ -197,7 +210,8 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
       "  asperity inspect bunny.obj\n"
       "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
       "  asperity inspect out/icosphere-relief/trace.asptrace --json");
-  command->callback([options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });
+  command->callback(
+      [options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });
   return command;
 }
 

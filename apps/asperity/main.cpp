@@ -41,7 +41,9 @@ int fail(const std::string& message) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Asperity renders fine surface detail to the hand: it slides a probe over a surface and answers the force at every tick."};
+  CLI::App app{
+      "Asperity renders fine surface detail to the hand: it slides a probe over a surface and answers the force at "
+      "every tick."};
   Console console;
   Action action;
   console.command_line = whole_command_line(argc, argv);

@@ -15,21 +15,27 @@
 namespace asperity::program {
 namespace {
 
-bool same_bits(const Vec3& a, const Vec3& b) { return std::memcmp(a.data(), b.data(), 3 * sizeof(double)) == 0; }
+bool same_bits(const Vec3& a, const Vec3& b) {
+  return std::memcmp(a.data(), b.data(), 3 * sizeof(double)) == 0;
+}
 
-std::string text_of(const Vec3& v) { return fmt::format("({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
+std::string text_of(const Vec3& v) {
+  return fmt::format("({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z());
+}
 
 struct Comparison {
   std::uint64_t different = 0;
   std::string first;  ///< which tick, and what differs
 };
 
-void compare_tick(const TraceRecord& recorded, const ForceSample& rendered, const Vec3& commanded, Comparison& comparison) {
+void compare_tick(const TraceRecord& recorded, const ForceSample& rendered, const Vec3& commanded,
+                  Comparison& comparison) {
   const auto check = [&](const char* what, const Vec3& before, const Vec3& now) {
     if (same_bits(before, now)) return true;
     ++comparison.different;
     if (comparison.first.empty()) {
-      comparison.first = fmt::format("tick {}: {} was {} N, is {} N", recorded.tick, what, text_of(before), text_of(now));
+      comparison.first =
+          fmt::format("tick {}: {} was {} N, is {} N", recorded.tick, what, text_of(before), text_of(now));
     }
     return false;
   };
@@ -46,7 +52,8 @@ Result<Comparison> play(const Trace& trace, const Experiment& experiment, const 
     const TraceRecord& record = trace.records[i];
     const ForceSample rendered = step(experiment.scene, state, record.probe, record.dt);
     compare_tick(record, rendered, safety.apply(rendered, record.probe, record.dt).force, comparison);
-    if (progress && i % 1000 == 0) progress("replaying", static_cast<double>(i) / static_cast<double>(trace.records.size()));
+    if (progress && i % 1000 == 0)
+      progress("replaying", static_cast<double>(i) / static_cast<double>(trace.records.size()));
   }
   return comparison;
 }
@@ -55,9 +62,14 @@ Result<int> replay(const std::string& path, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Trace trace, read_trace(path));
   if (trace.metadata.scene.empty()) {
-    return Error{ErrorCode::mismatch, "holds no scene, so that it cannot be replayed", path, {}, "a trace written by asperity touch"};
+    return Error{ErrorCode::mismatch,
+                 "holds no scene, so that it cannot be replayed",
+                 path,
+                 {},
+                 "a trace written by asperity touch"};
   }
-  if (trace.records.empty()) return Error{ErrorCode::mismatch, "holds no ticks", path, {}, "a trace with at least one tick"};
+  if (trace.records.empty())
+    return Error{ErrorCode::mismatch, "holds no ticks", path, {}, "a trace with at least one tick"};
   ASPERITY_TRY(const Experiment experiment, parse_experiment(trace.metadata.scene, ".", path + " (scene)", progress));
   ASPERITY_TRY(const Comparison comparison, play(trace, experiment, progress));
   const bool equal = comparison.different == 0;
@@ -71,10 +83,12 @@ Result<int> replay(const std::string& path, const Console& console) {
                        {"complete", trace.complete},
                        {"damage", trace.damage}});
   } else if (equal) {
-    std::cout << fmt::format("{}: {} ticks replayed, every force bit-equal (hash {})\n", path, trace.records.size(), format_hash(force_hash(trace.records)));
+    std::cout << fmt::format("{}: {} ticks replayed, every force bit-equal (hash {})\n", path, trace.records.size(),
+                             format_hash(force_hash(trace.records)));
   }
   if (!equal) {
-    std::cerr << fmt::format("asperity: {}: {} of {} ticks differ; {}\n", path, comparison.different, trace.records.size(), comparison.first);
+    std::cerr << fmt::format("asperity: {}: {} of {} ticks differ; {}\n", path, comparison.different,
+                             trace.records.size(), comparison.first);
   }
   if (!trace.complete) std::cerr << fmt::format("asperity: {}: the trace is not whole: {}\n", path, trace.damage);
   return equal && trace.complete ? exit_success : exit_check_failed;
@@ -88,7 +102,8 @@ CLI::App* add_replay(CLI::App& app, Console& console, Action& action) {
   command->add_option("TRACE", *path, "A trace written by asperity touch")->required();
   add_console_options(*command, console);
   command->footer(
-      "The scene is rebuilt from the trace; meshes and maps are read from where they were. Exit code 1: a force differs, or the trace is cut.\n"
+      "The scene is rebuilt from the trace; meshes and maps are read from where they were. Exit code 1: a force "
+      "differs, or the trace is cut.\n"
       "Examples:\n"
       "  asperity replay out/icosphere-relief/trace.asptrace\n"
       "  asperity replay out/bunny/trace.asptrace --json");

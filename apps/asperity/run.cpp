@@ -19,8 +19,8 @@ namespace {
 constexpr std::uint64_t most_ticks = 2'000'000;
 
 template <class Probe>
-Result<RunResult> run_with(const Experiment& experiment, Probe& probe, const std::function<Status(const TraceRecord&)>& record,
-                           const Progress& progress) {
+Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
+                           const std::function<Status(const TraceRecord&)>& record, const Progress& progress) {
   ASPERITY_TRY(SafetyStage safety, SafetyStage::build(SafetySettings::from_profile(experiment.device)));
   SessionSettings settings;
   settings.dt = Seconds(1.0 / experiment.rate);
@@ -57,17 +57,19 @@ std::string machine_line() {
   utsname system{};
   if (::uname(&system) != 0) return processor_name();
   const std::string processor = processor_name();
-  return fmt::format("{}{}{} {} {}", processor, processor.empty() ? "" : ", ", system.sysname, system.release, system.machine);
+  return fmt::format("{}{}{} {} {}", processor, processor.empty() ? "" : ", ", system.sysname, system.release,
+                     system.machine);
 }
 
 std::string surface_fact(const Instance& instance) {
   const TriangleMesh& mesh = base_mesh(instance.surface);
   const Vec3 extent = mesh.bounds().extent();
-  std::string text = fmt::format("{} triangles, {} x {} x {}", mesh.report().triangles, format_length(extent.x()), format_length(extent.y()),
-                                 format_length(extent.z()));
+  std::string text = fmt::format("{} triangles, {} x {} x {}", mesh.report().triangles, format_length(extent.x()),
+                                 format_length(extent.y()), format_length(extent.z()));
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
     const Coat& coat = (*relief)->coat();
-    text += fmt::format(", relief {} to {}, texel {}", format_length(coat.lowest()), format_length(coat.highest()), format_length(coat.texel_size()));
+    text += fmt::format(", relief {} to {}, texel {}", format_length(coat.lowest()), format_length(coat.highest()),
+                        format_length(coat.texel_size()));
   }
   return text;
 }
@@ -89,7 +91,8 @@ Result<RunResult> run_experiment(const Experiment& experiment, const std::functi
     if (!probe) return std::move(probe).error().at("probe.ideal");
     return run_with(experiment, *probe, record, progress);
   }
-  Result<SimulatedDevice> device = SimulatedDevice::build(experiment.path, experiment.device, experiment.hand, experiment.simulated);
+  Result<SimulatedDevice> device =
+      SimulatedDevice::build(experiment.path, experiment.device, experiment.hand, experiment.simulated);
   if (!device) return std::move(device).error().at("probe.dynamic");
   return run_with(experiment, *device, record, progress);
 }
@@ -110,17 +113,20 @@ std::vector<ReportFact> setup_facts(const Experiment& experiment) {
     facts.push_back({fmt::format("law, stiffness of \"{}\"", instance.name),
                      fmt::format("{}, {:.3g} N/mm", law_name(instance.law), instance.material.stiffness * 1e-3)});
   }
-  facts.push_back({"device", fmt::format("{}: {:g} N, {:g} N/mm, {} steps", experiment.device.name, experiment.device.max_force,
-                                         experiment.device.max_stiffness * 1e-3, format_length(experiment.device.position_resolution))});
+  facts.push_back({"device", fmt::format("{}: {:g} N, {:g} N/mm, {} steps", experiment.device.name,
+                                         experiment.device.max_force, experiment.device.max_stiffness * 1e-3,
+                                         format_length(experiment.device.position_resolution))});
   const double radius = experiment.scene.probe_radius();
   facts.push_back({"probe", fmt::format("{}, {}, {:g} Hz", experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic",
-                                        radius > 0.0 ? "radius " + format_length(radius) : std::string("a point"), experiment.rate)});
+                                        radius > 0.0 ? "radius " + format_length(radius) : std::string("a point"),
+                                        experiment.rate)});
   if (experiment.probe == ProbeKind::dynamic) facts.push_back({"hand", experiment.hand.name});
   const StrokeSettings& stroke = experiment.stroke;
   std::string text = fmt::format("{}, {}", to_string(stroke.type), format_length(experiment.path.length()));
   if (stroke.type != StrokeType::recorded) {
     text += fmt::format(" at {:.3g} mm/s, {}", stroke.speed * 1e3,
-                        stroke.press == PressMode::force ? fmt::format("pressed with {:.3g} N", stroke.normal_force) : "depth " + format_length(stroke.depth));
+                        stroke.press == PressMode::force ? fmt::format("pressed with {:.3g} N", stroke.normal_force)
+                                                         : "depth " + format_length(stroke.depth));
   }
   facts.push_back({"stroke", text});
   return facts;
@@ -141,8 +147,12 @@ Status make_output_folder(const std::string& folder) {
   std::error_code problem;
   std::filesystem::create_directories(folder, problem);
   if (problem || !std::filesystem::is_directory(folder, problem)) {
-    return Error{ErrorCode::file_unwritable, fmt::format("cannot be made a folder: {}", problem ? problem.message() : "something else has that name"),
-                 folder, {}, "a folder that can be written to (--out DIR)"};
+    return Error{
+        ErrorCode::file_unwritable,
+        fmt::format("cannot be made a folder: {}", problem ? problem.message() : "something else has that name"),
+        folder,
+        {},
+        "a folder that can be written to (--out DIR)"};
   }
   return success();
 }
@@ -158,7 +168,8 @@ std::string format_seconds(double seconds) {
 std::string flag_list(const TickMetrics& ticks) {
   std::string list;
   for (std::size_t bit = 1; bit < ticks.flags.size(); ++bit) {
-    if (ticks.flags[bit] > 0) list += fmt::format("{}{} ({} ticks)", list.empty() ? "" : ", ", flag_name(bit), ticks.flags[bit]);
+    if (ticks.flags[bit] > 0)
+      list += fmt::format("{}{} ({} ticks)", list.empty() ? "" : ", ", flag_name(bit), ticks.flags[bit]);
   }
   return list.empty() ? "none" : list;
 }

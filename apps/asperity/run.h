@@ -25,8 +25,8 @@ struct RunResult {
 /// Whether the stroke's ticks can be kept in memory. Errors: too_large. [main]
 Status check_length(const Experiment& experiment);
 
-/// Runs the whole stroke. `record` gets every tick as well (the trace); it may be empty. Errors: of the probe and the safety
-/// stage; too_large when the stroke has more ticks than are kept in memory. [main]
+/// Runs the whole stroke. `record` gets every tick as well (the trace); it may be empty. Errors: of the probe and the
+/// safety stage; too_large when the stroke has more ticks than are kept in memory. [main]
 Result<RunResult> run_experiment(const Experiment& experiment, const std::function<Status(const TraceRecord&)>& record,
                                  const Progress& progress);
 

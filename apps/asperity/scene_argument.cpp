@@ -28,9 +28,13 @@ Error unknown_scene(const std::string& scene) {
   std::vector<std::string> names;
   for (const BuiltinScene& builtin : builtin_scenes()) names.push_back(builtin.name);
   const std::string near = nearest_name(scene, names);
-  return Error{ErrorCode::file_missing,
-               fmt::format("no such file, and no built-in scene of that name{}", near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-               scene, {}, fmt::format("a scene (.json), a mesh (.obj, .ply, .stl), or a built-in scene: {}", fmt::join(names, ", "))};
+  return Error{
+      ErrorCode::file_missing,
+      fmt::format("no such file, and no built-in scene of that name{}",
+                  near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+      scene,
+      {},
+      fmt::format("a scene (.json), a mesh (.obj, .ply, .stl), or a built-in scene: {}", fmt::join(names, ", "))};
 }
 
 /// The first byte that is no white space; 0 when there is none.
@@ -46,7 +50,14 @@ bool is_scene_file(const std::string& file) {
   return extension != ".obj" && extension != ".ply" && extension != ".stl" && first_mark(file) == '{';
 }
 
-std::string absolute(const std::string& path) { return fs::absolute(path).lexically_normal().string(); }
+bool is_picture_file(const std::string& file) {
+  const std::string extension = lower_extension(file);
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+std::string absolute(const std::string& path) {
+  return fs::absolute(path).lexically_normal().string();
+}
 
 /// Puts `value` at `key` of `object` when it was given. What stands in the way is left for the reader to name.
 void put(Json& object, const char* key, const std::string& value) {
@@ -64,12 +75,16 @@ void drop(Json& object, const char* key) {
 }
 
 void change_coat(Json& surface, const SceneArgument& a) {
-  const bool any = !(a.relief + a.height + a.tile + a.normal_map + a.channel + a.white_is + a.mapping + a.magnify).empty();
+  const bool any =
+      !(a.relief + a.height + a.tile + a.normal_map + a.channel + a.white_is + a.mapping + a.magnify).empty();
   if (!any) return;
   Json& coat = member(surface, "coat");
   if (!a.relief.empty()) {
     // What described another map does not describe this one.
-    for (const char* key : {"channel", "white_is", "height_range", "normal_map", "green"}) drop(coat, key);
+    for (const char* key :
+         {"channel", "white_is", "height", "height_range", "offset", "tile", "magnify", "normal_map", "green"}) {
+      drop(coat, key);
+    }
     if (coat.is_object()) coat["height_map"] = absolute(a.relief);
   }
   if (!a.height.empty()) drop(coat, "height_range");
@@ -122,15 +137,19 @@ void change_stroke(Json& scene, const SceneArgument& a, bool loops) {
 }  // namespace
 
 void add_scene_options(CLI::App& command, SceneArgument& a) {
-  command.add_option("SCENE", a.scene, "A scene file, a mesh (OBJ, PLY, STL), or a built-in scene (asperity scenes)")->capture_default_str();
+  command.add_option("SCENE", a.scene, "A scene file, a mesh (OBJ, PLY, STL), or a built-in scene (asperity scenes)")
+      ->capture_default_str();
   command.add_option("--relief", a.relief, "Height map (PNG, JPEG) to lay on every surface")->group("Relief");
   command.add_option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge")->group("Relief");
-  command.add_option("--tile", a.tile, "Width of one repeat of the map, for meshes without texture coordinates: 20mm")->group("Relief");
+  command.add_option("--tile", a.tile, "Width of one repeat of the map, for meshes without texture coordinates: 20mm")
+      ->group("Relief");
   command.add_option("--normal-map", a.normal_map, "Normal map that belongs to the relief")->group("Relief");
-  command.add_option("--channel", a.channel, "Channel of the heights: automatic, luminance, red, green, blue, alpha")->group("Relief");
+  command.add_option("--channel", a.channel, "Channel of the heights: automatic, luminance, red, green, blue, alpha")
+      ->group("Relief");
   command.add_option("--white-is", a.white_is, "high, or deep for depth maps")->group("Relief");
   command.add_option("--mapping", a.mapping, "auto, uv, per_face, triplanar")->group("Relief");
-  command.add_option("--magnify", a.magnify, "Factor on heights and tile, for surfaces measured in micrometres")->group("Relief");
+  command.add_option("--magnify", a.magnify, "Factor on heights and tile, for surfaces measured in micrometres")
+      ->group("Relief");
   command.add_option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in")->group("Mesh");
   command.add_option("--fit", a.fit, "workspace, none, or the largest side: 80mm")->group("Mesh");
   command.add_option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z")->group("Mesh");
@@ -156,10 +175,21 @@ Result<SceneText> find_scene(const std::string& scene) {
     }
     return unknown_scene(scene);
   }
-  if (fs::is_directory(scene, ignored)) return Error{ErrorCode::file_missing, "is a folder", scene, {}, "a scene, a mesh, or a built-in scene"};
-  if (is_trace_file(scene)) return Error{ErrorCode::file_unsupported, "is a trace", scene, {}, "a scene or a mesh (asperity replay plays traces)"};
+  if (fs::is_directory(scene, ignored))
+    return Error{ErrorCode::file_missing, "is a folder", scene, {}, "a scene, a mesh, or a built-in scene"};
+  if (is_trace_file(scene))
+    return Error{
+        ErrorCode::file_unsupported, "is a trace", scene, {}, "a scene or a mesh (asperity replay plays traces)"};
+  if (is_picture_file(scene)) {
+    return Error{ErrorCode::file_unsupported,
+                 "is a picture",
+                 scene,
+                 {},
+                 "a scene or a mesh (--relief FILE lays a picture on it)"};
+  }
   if (!is_scene_file(scene)) {
-    const Json made = {{"name", fs::path(scene).stem().string()}, {"surfaces", Json::array({Json{{"mesh", absolute(scene)}}})}};
+    const Json made = {{"name", fs::path(scene).stem().string()},
+                       {"surfaces", Json::array({Json{{"mesh", absolute(scene)}}})}};
     return SceneText{made.dump(2, ' ', false, Json::error_handler_t::replace), ".", scene};
   }
   std::ifstream stream(scene, std::ios::binary);

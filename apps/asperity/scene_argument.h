@@ -27,7 +27,8 @@ void add_scene_options(CLI::App& command, SceneArgument& argument);
 /// `loops`: let an open stroke go there and back, so that energy over closed loops can be told. [main]
 Result<Experiment> load_scene(const SceneArgument& argument, const Progress& progress, bool loops = false);
 
-/// The text of a scene file, of a built-in scene, or of a scene made from a mesh, with the folder its paths start from. [main]
+/// The text of a scene file, of a built-in scene, or of a scene made from a mesh, with the folder its paths start from.
+/// [main]
 struct SceneText {
   std::string text;
   std::string folder;

@@ -15,13 +15,15 @@ namespace {
 Result<int> list_scenes(const Console& console) {
   if (console.json) {
     Json list = Json::array();
-    for (const BuiltinScene& scene : builtin_scenes()) list.push_back(Json{{"name", scene.name}, {"summary", scene.summary}});
+    for (const BuiltinScene& scene : builtin_scenes())
+      list.push_back(Json{{"name", scene.name}, {"summary", scene.summary}});
     console.print(list);
     return exit_success;
   }
   std::size_t width = 0;
   for (const BuiltinScene& scene : builtin_scenes()) width = std::max(width, scene.name.size());
-  for (const BuiltinScene& scene : builtin_scenes()) std::cout << fmt::format("{:<{}}  {}\n", scene.name, width, scene.summary);
+  for (const BuiltinScene& scene : builtin_scenes())
+    std::cout << fmt::format("{:<{}}  {}\n", scene.name, width, scene.summary);
   return exit_success;
 }
 
@@ -53,7 +55,8 @@ CLI::App* add_schema(CLI::App& app, Console& console, Action& action) {
   CLI::App* command = app.add_subcommand("schema", "Print the JSON Schema of scene files");
   add_console_options(*command, console, false);
   command->footer(
-      "Every key with its unit, range and default. Editors complete and check scenes with it (\"$schema\": \"scene.schema.json\").\n"
+      "Every key with its unit, range and default. Editors complete and check scenes with it (\"$schema\": "
+      "\"scene.schema.json\").\n"
       "Example:\n"
       "  asperity schema > scene.schema.json");
   command->callback([&action] {

@@ -49,7 +49,12 @@ class TraceOutput {
     ASPERITY_CHECK(writer_.finish());
     std::error_code problem;
     fs::rename(path_ + ".part", path_, problem);
-    if (problem) return Error{ErrorCode::file_unwritable, "cannot be renamed: " + problem.message(), path_, {}, "a file that can be replaced"};
+    if (problem)
+      return Error{ErrorCode::file_unwritable,
+                   "cannot be renamed: " + problem.message(),
+                   path_,
+                   {},
+                   "a file that can be replaced"};
     return success();
   }
   void discard() const {
@@ -63,8 +68,8 @@ class TraceOutput {
   TraceWriter writer_;
 };
 
-Result<RunReport> build_report(const Experiment& experiment, const RunResult& run, const Console& console, const Progress& progress,
-                               bool with_picture) {
+Result<RunReport> build_report(const Experiment& experiment, const RunResult& run, const Console& console,
+                               const Progress& progress, bool with_picture) {
   RunReport report;
   report.origin = report_origin(experiment, console);
   report.law = law_names_of(experiment.scene);
@@ -82,27 +87,39 @@ Result<RunReport> build_report(const Experiment& experiment, const RunResult& ru
 Json run_json(const Experiment& experiment, const RunResult& run, const RunReport& report, const Json& files) {
   Json setup = Json::object();
   for (const ReportFact& fact : report.setup) setup[fact.name] = fact.value;
-  return Json{{"program", report.origin.program}, {"command", report.origin.command}, {"date", report.origin.date},
-              {"machine", report.origin.machine}, {"scene", experiment.name},         {"law", report.law},
-              {"setup", setup},                   {"ticks", run.summary.ticks},       {"force_hash", format_hash(run.hash)},
-              {"metrics", Json::parse(metrics_json(report.metrics))},                 {"notes", report.origin.notes},
-              {"warnings", report.origin.warnings},                                   {"files", files}};
+  return Json{{"program", report.origin.program},
+              {"command", report.origin.command},
+              {"date", report.origin.date},
+              {"machine", report.origin.machine},
+              {"scene", experiment.name},
+              {"law", report.law},
+              {"setup", setup},
+              {"ticks", run.summary.ticks},
+              {"force_hash", format_hash(run.hash)},
+              {"metrics", Json::parse(metrics_json(report.metrics))},
+              {"notes", report.origin.notes},
+              {"warnings", report.origin.warnings},
+              {"files", files}};
 }
 
 std::string height_line(const HeightMetrics& height) {
   if (height.samples == 0) return "nothing to compare";
-  if (!std::isfinite(height.relative_error)) return fmt::format("no relief on the way; RMS {}", format_length(height.rms_error));
-  return fmt::format("RMS error {:.2f} % of {} met ({})", 100.0 * height.relative_error, format_length(height.amplitude),
-                     format_length(height.rms_error));
+  if (!std::isfinite(height.relative_error))
+    return fmt::format("no relief on the way; RMS {}", format_length(height.rms_error));
+  return fmt::format("RMS error {:.2f} % of {} met ({})", 100.0 * height.relative_error,
+                     format_length(height.amplitude), format_length(height.rms_error));
 }
 
-void print_summary(const Experiment& experiment, const RunResult& run, const RunReport& report, const std::string& where) {
+void print_summary(const Experiment& experiment, const RunResult& run, const RunReport& report,
+                   const std::string& where) {
   const RunMetrics& m = report.metrics;
   std::cout << fmt::format("scene    {}\n", experiment.name);
   std::cout << fmt::format("law      {}\n", report.law);
-  std::cout << fmt::format("device   {}, {} probe\n", experiment.device.name, experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic");
+  std::cout << fmt::format("device   {}, {} probe\n", experiment.device.name,
+                           experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic");
   std::cout << fmt::format("stroke   {}\n", report.setup.back().value);
-  std::cout << fmt::format("ticks    {} at {:g} Hz, {} in contact\n", run.summary.ticks, experiment.rate, m.ticks.contact);
+  std::cout << fmt::format("ticks    {} at {:g} Hz, {} in contact\n", run.summary.ticks, experiment.rate,
+                           m.ticks.contact);
   std::cout << fmt::format("force    mean {:.3g} N, max {:.3g} N\n", m.force.mean, m.force.max);
   std::cout << fmt::format("height   {}\n", height_line(m.height));
   std::cout << fmt::format("update   p50 {}, p99.9 {}\n", format_seconds(m.update.p50), format_seconds(m.update.p999));
@@ -111,8 +128,8 @@ void print_summary(const Experiment& experiment, const RunResult& run, const Run
   std::cout << fmt::format("{}\n", where);
 }
 
-Status write_outputs(const Experiment& experiment, const RunResult& run, const RunReport& report, const TouchOptions& options,
-                     const TraceMetadata& metadata, const fs::path& folder, Json& files) {
+Status write_outputs(const Experiment& experiment, const RunResult& run, const RunReport& report,
+                     const TouchOptions& options, const TraceMetadata& metadata, const fs::path& folder, Json& files) {
   if (options.csv) {
     const Trace trace{metadata, run.records, true, 0, {}};
     ASPERITY_CHECK(export_trace(trace, (folder / "trace.csv").string()));
@@ -122,7 +139,8 @@ Status write_outputs(const Experiment& experiment, const RunResult& run, const R
     ASPERITY_CHECK(write_run_report(folder / "report.html", report));
     files["report"] = (folder / "report.html").string();
   }
-  const std::string numbers = run_json(experiment, run, report, files).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string numbers =
+      run_json(experiment, run, report, files).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   return write_file_atomically(folder / "run.json", numbers);
 }
 
@@ -135,7 +153,8 @@ Result<int> touch(const TouchOptions& options, const Console& console) {
   const TraceMetadata metadata = metadata_of(experiment, options, console);
   const std::string trace_path = (folder / "trace.asptrace").string();
   ASPERITY_TRY(TraceOutput trace, TraceOutput::open(trace_path, metadata));
-  Result<RunResult> run = run_experiment(experiment, [&](const TraceRecord& tick) { return trace.append(tick); }, progress);
+  Result<RunResult> run = run_experiment(
+      experiment, [&](const TraceRecord& tick) { return trace.append(tick); }, progress);
   if (!run) {
     trace.discard();
     return std::move(run).error();
@@ -146,13 +165,15 @@ Result<int> touch(const TouchOptions& options, const Console& console) {
   ASPERITY_CHECK(write_outputs(experiment, *run, report, options, metadata, folder, files));
   for (const std::string& note : experiment.notes) console.note(note);
   for (const std::string& warning : report.origin.warnings) console.note(warning);
-  const std::string where = options.no_report ? "trace    " + trace_path : "report   " + (folder / "report.html").string();
+  const std::string where =
+      options.no_report ? "trace    " + trace_path : "report   " + (folder / "report.html").string();
   if (console.json) {
     console.print(run_json(experiment, *run, report, files));
   } else {
     print_summary(experiment, *run, report, where);
   }
-  const bool broken = run->summary.flags.has(TickFlag::output_not_finite) || run->summary.flags.has(TickFlag::input_not_finite);
+  const bool broken =
+      run->summary.flags.has(TickFlag::output_not_finite) || run->summary.flags.has(TickFlag::input_not_finite);
   if (broken) console.note("a probe position or a force was not finite");
   return broken ? exit_check_failed : exit_success;
 }
@@ -163,19 +184,24 @@ CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
   CLI::App* command = app.add_subcommand("touch", "Slide a probe over a scene; write trace, numbers and report");
   auto options = std::make_shared<TouchOptions>();
   add_scene_options(*command, options->scene);
-  command->add_option("--law", options->scene.law, "Of every surface: god-object, force-shading, height-field, mesostructure; -literal as printed")->group("Touch");
+  command
+      ->add_option("--law", options->scene.law,
+                   "Of every surface: god-object, force-shading, height-field, mesostructure; -literal as printed")
+      ->group("Touch");
   command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE");
   command->add_flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
   command->add_flag("--csv", options->csv, "The trace as a table as well (trace.csv, trace.json)");
   add_console_options(*command, console);
   command->footer(
-      "A mesh alone, or a mesh and a map, is a scene: the mesh is fitted to the device's workspace, the map is laid on it.\n"
+      "A mesh alone, or a mesh and a map, is a scene: the mesh is fitted to the device's workspace, the map is laid on "
+      "it.\n"
       "Examples:\n"
       "  asperity touch                                           the built-in scene\n"
       "  asperity touch bunny.obj --relief rock.png --height 2mm --tile 30mm\n"
       "  asperity touch M_a-H_3 --law height-field-literal --force 1N\n"
       "  asperity touch my.json --probe dynamic --device omega.7 --json --no-report");
-  command->callback([options, &console, &action] { action = [options, &console] { return touch(*options, console); }; });
+  command->callback(
+      [options, &console, &action] { action = [options, &console] { return touch(*options, console); }; });
   return command;
 }
 

@@ -64,10 +64,12 @@ class Bvh::Builder {
       all.box.include(primitives_[face]);
     }
     bvh_.leaves_.reserve(count / 5 + 1);
+    bvh_.cylinders_.reserve(count / 5 + 1);
     bvh_.nodes_.reserve(count / 24 + 1);
     build_node(all, 0);
     bvh_.nodes_.shrink_to_fit();
     bvh_.leaves_.shrink_to_fit();
+    bvh_.cylinders_.shrink_to_fit();
   }
 
  private:
@@ -138,7 +140,37 @@ class Bvh::Builder {
       }
     }
     bvh_.leaves_.push_back(leaf);
+    bvh_.cylinders_.push_back(around(range));
     return static_cast<std::uint32_t>(bvh_.leaves_.size() - 1) | leaf_bit;
+  }
+
+  /// The cylinder around a leaf: its axis is the mean normal, by area.
+  [[nodiscard]] Cylinder around(const Range& range) const {
+    Vec3 normal = Vec3::Zero();
+    Box box;
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      const auto [a, b, c] = mesh_.corners(primitives_[i].face);
+      normal += (b - a).cross(c - a);
+      for (const Vec3& corner : {a, b, c}) box.include(corner);
+    }
+    const Vec3 axis = normal.norm() > 0.0 ? Vec3(normal.normalized()) : Vec3(Vec3::UnitZ());
+    const Vec3 centre = box.centre();
+    double radius = 0.0;
+    double half_height = 0.0;
+    for (std::uint32_t i = range.first; i < range.last; ++i) {
+      for (const Vec3& corner : mesh_.corners(primitives_[i].face)) {
+        const double along = axis.dot(corner - centre);
+        half_height = std::max(half_height, std::abs(along));
+        radius = std::max(radius, (corner - centre - along * axis).norm());
+      }
+    }
+    Cylinder cylinder;
+    bvh_.to_local(centre, cylinder.centre);
+    for (int k = 0; k < 3; ++k) cylinder.axis[k] = static_cast<float>(axis[k]);
+    // Room for the rounding of centre and axis.
+    cylinder.radius = static_cast<float>(radius * bvh_.per_scale_) * 1.00001F + 1e-6F;
+    cylinder.half_height = static_cast<float>(half_height * bvh_.per_scale_) * 1.00001F + 1e-6F;
+    return cylinder;
   }
 
   /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
@@ -298,8 +330,6 @@ class NearestLeaves {
   struct Entry {
     float squared;
     std::uint32_t leaf;
-    std::uint32_t node;  ///< that holds its box
-    std::uint32_t slot;
     bool operator<(const Entry& other) const noexcept { return squared < other.squared; }
   };
 
@@ -354,7 +384,7 @@ void Bvh::gather(const Vec3& centre, double reach, std::uint64_t owner, Triangle
     for (; mask != 0; mask &= mask - 1) {
       const auto i = static_cast<unsigned>(__builtin_ctz(mask));
       if ((node.child[i] & leaf_bit) != 0) {
-        nearest.offer({squared[i], node.child[i] & ~leaf_bit, entry.child, i});
+        nearest.offer({squared[i], node.child[i] & ~leaf_bit});
         continue;
       }
       int slot = top++;
@@ -373,11 +403,15 @@ void Bvh::gather(const Vec3& centre, double reach, std::uint64_t owner, Triangle
     const NearestLeaves::Entry& entry = nearest[used ? i : 0];
     if (i % 8 == 0) patch.nearest[i / 8] = std::max(0.0F, std::sqrt(entry.squared) - error);
     patch.leaf[i] = used ? entry.leaf : 0;
-    const BoxesOf8& from = nodes_[entry.node].boxes;
+    const Cylinder& from = cylinders_[patch.leaf[i]];
+    CylindersOf8& to = patch.bounds[i / 8];
+    const std::uint32_t lane = i % 8;
     for (int axis = 0; axis < 3; ++axis) {
-      patch.boxes[i / 8].lower[axis][i % 8] = used ? from.lower[axis][entry.slot] : 1e30F;
-      patch.boxes[i / 8].upper[axis][i % 8] = used ? from.upper[axis][entry.slot] : -1e30F;
+      to.centre[axis][lane] = used ? from.centre[axis] : 1e9F;
+      to.axis[axis][lane] = from.axis[axis];
     }
+    to.radius[lane] = from.radius;
+    to.half_height[lane] = from.half_height;
   }
 }
 

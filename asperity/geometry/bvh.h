@@ -55,7 +55,8 @@ class Bvh {
   void for_each_along(const Segment& segment, double radius, Visit&& visit) const;
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return sizeof(*this) + nodes_.capacity() * sizeof(Node) + leaves_.capacity() * sizeof(Leaf);
+    return sizeof(*this) + nodes_.capacity() * sizeof(Node) + leaves_.capacity() * sizeof(Leaf) +
+           cylinders_.capacity() * sizeof(Cylinder);
   }
   [[nodiscard]] const char* kernel_name() const noexcept { return kernels_->name; }
 
@@ -71,6 +72,12 @@ class Bvh {
   struct Leaf {
     TrianglesOf8 triangles;
     std::uint32_t face[8];
+  };
+  struct Cylinder {
+    float centre[3];
+    float axis[3];
+    float radius;
+    float half_height;
   };
   struct Entry {
     float key;
@@ -91,6 +98,7 @@ class Bvh {
   double per_scale_ = 1.0;  ///< 1 / scale_
   std::vector<Node> nodes_;
   std::vector<Leaf> leaves_;
+  std::vector<Cylinder> cylinders_;  ///< one around each leaf
 };
 
 inline void Bvh::to_local(const Vec3& p, float local[3]) const noexcept {
@@ -125,8 +133,7 @@ void Bvh::scan(const TrianglePatch& patch, const Vec3& p, double reach, Visit&& 
   for (std::uint32_t first = 0; first < patch.count; first += 8) {
     // The nearest leaf of the block has come at most `moved` nearer; blocks are in ascending order.
     if (patch.nearest[first / 8] - moved > limit) break;
-    float squared[8];
-    unsigned mask = kernels_->boxes(patch.boxes[first / 8], local, limit * limit, squared);
+    unsigned mask = kernels_->cylinders(patch.bounds[first / 8], local, limit);
     for (; mask != 0; mask &= mask - 1) {
       scan_leaf(patch.leaf[first + static_cast<unsigned>(__builtin_ctz(mask))], local, limit, visit);
     }

@@ -27,6 +27,24 @@ unsigned plain_boxes(const BoxesOf8& boxes, const float point[3], float bound, f
   return mask;
 }
 
+unsigned plain_cylinders(const CylindersOf8& cylinders, const float point[3], float bound) noexcept {
+  unsigned mask = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const float x = point[0] - cylinders.centre[0][i];
+    const float y = point[1] - cylinders.centre[1][i];
+    const float z = point[2] - cylinders.centre[2][i];
+    const float along = x * cylinders.axis[0][i] + y * cylinders.axis[1][i] + z * cylinders.axis[2][i];
+    const float across_x = x - along * cylinders.axis[0][i];
+    const float across_y = y - along * cylinders.axis[1][i];
+    const float across_z = z - along * cylinders.axis[2][i];
+    const float across = std::sqrt(across_x * across_x + across_y * across_y + across_z * across_z);
+    const float beyond = std::max(0.0F, across - cylinders.radius[i]);
+    const float above = std::max(0.0F, std::abs(along) - cylinders.half_height[i]);
+    mask |= static_cast<unsigned>(beyond * beyond + above * above <= bound * bound) << i;
+  }
+  return mask;
+}
+
 unsigned plain_ray(const BoxesOf8& boxes, const float origin[3], const float inverse_direction[3], float t_end,
                    float margin, float entry[8]) noexcept {
   unsigned mask = 0;
@@ -162,6 +180,22 @@ ASPERITY_AVX2 inline Vector8 from_edge8(const Vector8& p, const Vector8& e) noex
   return {_mm256_fnmadd_ps(t, e.x, p.x), _mm256_fnmadd_ps(t, e.y, p.y), _mm256_fnmadd_ps(t, e.z, p.z)};
 }
 
+ASPERITY_AVX2 unsigned avx2_cylinders(const CylindersOf8& cylinders, const float point[3], float bound) noexcept {
+  const Vector8 query{_mm256_set1_ps(point[0]), _mm256_set1_ps(point[1]), _mm256_set1_ps(point[2])};
+  const Vector8 p = sub8(query, load8(cylinders.centre));
+  const Vector8 axis = load8(cylinders.axis);
+  const __m256 along = dot8(p, axis);
+  const Vector8 across{_mm256_fnmadd_ps(along, axis.x, p.x), _mm256_fnmadd_ps(along, axis.y, p.y),
+                       _mm256_fnmadd_ps(along, axis.z, p.z)};
+  const __m256 zero = _mm256_setzero_ps();
+  const __m256 magnitude = _mm256_andnot_ps(_mm256_set1_ps(-0.0F), along);
+  const __m256 beyond =
+      _mm256_max_ps(zero, _mm256_sub_ps(_mm256_sqrt_ps(dot8(across, across)), _mm256_load_ps(cylinders.radius)));
+  const __m256 above = _mm256_max_ps(zero, _mm256_sub_ps(magnitude, _mm256_load_ps(cylinders.half_height)));
+  const __m256 squared = _mm256_fmadd_ps(beyond, beyond, _mm256_mul_ps(above, above));
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(squared, _mm256_set1_ps(bound * bound), _CMP_LE_OQ)));
+}
+
 ASPERITY_AVX2 void avx2_triangles(const TrianglesOf8& triangles, const float point[3], DistancesOf8& out) noexcept {
   const Vector8 query{_mm256_set1_ps(point[0]), _mm256_set1_ps(point[1]), _mm256_set1_ps(point[2])};
   const Vector8 p = sub8(query, load8(triangles.corner));
@@ -200,13 +234,13 @@ ASPERITY_AVX2 void avx2_triangles(const TrianglesOf8& triangles, const float poi
 }  // namespace
 
 const SearchKernels& plain_kernels() noexcept {
-  static constexpr SearchKernels kernels{"plain", plain_boxes, plain_ray, plain_triangles};
+  static constexpr SearchKernels kernels{"plain", plain_boxes, plain_cylinders, plain_ray, plain_triangles};
   return kernels;
 }
 
 const SearchKernels& best_kernels() noexcept {
 #if defined(__x86_64__)
-  static constexpr SearchKernels avx2{"avx2", avx2_boxes, avx2_ray, avx2_triangles};
+  static constexpr SearchKernels avx2{"avx2", avx2_boxes, avx2_cylinders, avx2_ray, avx2_triangles};
   static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (supported) return avx2;
 #endif

@@ -13,6 +13,15 @@ struct alignas(32) BoxesOf8 {
   float upper[3][8];
 };
 
+/// Eight flat cylinders side by side: the set of points within `radius` of an axis and `half_height` of its middle. They fit
+/// the leaf of a smooth surface far tighter than a box: what a ball resting on it nearly touches is few cylinders.
+struct alignas(32) CylindersOf8 {
+  float centre[3][8];
+  float axis[3][8];  ///< unit
+  float radius[8];
+  float half_height[8];
+};
+
 /// Eight triangles side by side: a corner and the two edges from it. An unused slot lies far away.
 struct alignas(32) TrianglesOf8 {
   float corner[3][8];
@@ -31,6 +40,8 @@ struct SearchKernels {
   const char* name;
   /// Squared distances (m²) from `point` to eight boxes; answers a bit mask of those <= `bound`.
   unsigned (*boxes)(const BoxesOf8& boxes, const float point[3], float bound, float squared[8]) noexcept;
+  /// Bit mask of the cylinders that come within `bound` (m) of `point`.
+  unsigned (*cylinders)(const CylindersOf8& cylinders, const float point[3], float bound) noexcept;
   /// Entry parameters of the line origin + t * direction (t in 0 … `t_end`) into eight boxes grown by `margin`;
   /// answers a bit mask of the boxes met.
   unsigned (*ray)(const BoxesOf8& boxes, const float origin[3], const float inverse_direction[3], float t_end,

@@ -23,6 +23,9 @@ constexpr double same_plane_cosine = 1.0 - 1e-10;
 // Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
 constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
+// A ball that moves by less than this share of its radius between two places where nothing reaches into it cannot have passed
+// anything: on the way a triangle comes nearer than at both ends by at most an eighth of length^2 / radius.
+constexpr double glide_of_radius = 0.25;
 // A ball resting within this many skins of a triangle touches it.
 constexpr double touch_in_skins = 2.0;
 std::uint64_t next_identity() {
@@ -199,6 +202,23 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
+bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept {
+  const double margin = error(end);
+  const double blocked = radius + blocked_in_skins * skin_;
+  ContactSet contacts;
+  bool free = true;
+  scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
+    if (distance > touch + margin || !free) return;
+    const auto [a, b, c] = mesh_->corners(face);
+    free = closest_point_on_triangle(end, a, b, c).squared_distance > blocked * blocked;
+    add_contact(face, end, touch, sides, contacts);
+  });
+  if (!free) return false;
+  settle_edges(end, contacts);
+  remember(end, radius, sides, contacts, patch);
+  return true;
+}
+
 SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
   const double length = direction.norm();
@@ -217,8 +237,9 @@ SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides,
         *structure_);
     return best;
   }
-  const double margin = error(motion.from);
   const double touch = radius + touch_in_skins * skin_;
+  if (length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) return best;
+  const double margin = error(motion.from);
   const auto resting_on = [&](std::uint32_t face) {
     // What the ball rests on cannot be hit by a motion that does not go into it.
     if (!patch.rested || patch.rest_position != motion.from || patch.rest_radius != radius) return false;

@@ -31,7 +31,7 @@ struct TrianglePatch {
   // Left uninitialised: only `count` entries are ever read. All in the structure's own units.
   float nearest[capacity / 8];          ///< per block of eight leaves: least distance to `centre`, ascending
   std::uint32_t leaf[capacity];
-  BoxesOf8 boxes[capacity / 8];
+  CylindersOf8 bounds[capacity / 8];
 
   TrianglePatch() noexcept {}  // NOLINT: see above
 

@@ -19,7 +19,12 @@ Result<std::string> read_text(const std::filesystem::path& file) {
     return Error{ErrorCode::file_missing, "is a folder", file.string(), {}, "a scene file (JSON)"};
   }
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) return Error{ErrorCode::file_missing, "cannot be read: no such file, or no permission", file.string(), {}, "a scene file (JSON)"};
+  if (!stream)
+    return Error{ErrorCode::file_missing,
+                 "cannot be read: no such file, or no permission",
+                 file.string(),
+                 {},
+                 "a scene file (JSON)"};
   std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   return text;
 }
@@ -55,7 +60,8 @@ SurfaceProjector projector(const Scene& scene) {
       if (!foot.found() || foot.distance >= nearest) continue;
       nearest = foot.distance;
       best.point = instance.world_from_object.apply(foot.point);
-      best.normal = instance.world_from_object.rotate(pseudonormal(base.mesh(), foot.element, foot.barycentric)).normalized();
+      best.normal =
+          instance.world_from_object.rotate(pseudonormal(base.mesh(), foot.element, foot.barycentric)).normalized();
     }
     return best;
   };
@@ -69,7 +75,8 @@ Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& co
   } else if (!surfaces->is_array()) {
     root.fail_type("surfaces", *surfaces, accepted);
   } else if (surfaces->empty() || surfaces->size() > most_surfaces) {
-    root.fail("surfaces", fmt::format("has {} entries", surfaces->size()), fmt::format("1 to {} surfaces", most_surfaces));
+    root.fail("surfaces", fmt::format("has {} entries", surfaces->size()),
+              fmt::format("1 to {} surfaces", most_surfaces));
   }
   ASPERITY_CHECK(root.status());
   std::vector<Instance> instances;
@@ -85,16 +92,16 @@ Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& co
 void read_heading(ObjectReader& root, const std::string& fallback, std::string& name) {
   const int version = root.integer("asperity", format_version, 1, 1000000);
   if (version != format_version) {
-    root.fail("asperity", fmt::format("is {}, a newer format than this program reads", version), fmt::format("{}", format_version),
-              ErrorCode::file_unsupported);
+    root.fail("asperity", fmt::format("is {}, a newer format than this program reads", version),
+              fmt::format("{}", format_version), ErrorCode::file_unsupported);
   }
   name = root.text("name", fallback);
   if (root.has("summary")) root.text("summary", {});
   if (root.has("$schema")) root.text("$schema", {});
 }
 
-Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem::path& folder, const std::string& fallback_name,
-                                    const Progress& progress) {
+Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem::path& folder,
+                                    const std::string& fallback_name, const Progress& progress) {
   ObjectReader root(json, "", "scene");
   ASPERITY_CHECK(root.status());
   std::string name;
@@ -145,7 +152,8 @@ Result<Experiment> parse_experiment(std::string_view json, const std::filesystem
                                     const Progress& progress) {
   try {
     ASPERITY_TRY(const SceneJson parsed, parse_scene_json(json, name));
-    Result<Experiment> experiment = build_experiment(parsed, folder, std::filesystem::path(name).stem().string(), progress);
+    Result<Experiment> experiment =
+        build_experiment(parsed, folder, std::filesystem::path(name).stem().string(), progress);
     if (!experiment) return std::move(experiment).error().in_file(name);
     return experiment;
   } catch (const std::bad_alloc&) {

@@ -28,16 +28,17 @@ struct Experiment {
   std::string name;
   Scene scene;
   ProbeKind probe = ProbeKind::ideal;
-  DeviceProfile device;            ///< limits of the safety stage; mechanics when the probe is dynamic
+  DeviceProfile device;  ///< limits of the safety stage; mechanics when the probe is dynamic
   HandImpedance hand;
   IdealProbeSettings ideal;
   SimulatedDeviceSettings simulated;
-  double rate = 1000.0;            ///< Hz
+  double rate = 1000.0;  ///< Hz
   StrokeSettings stroke;
   StrokePath path;
   /// What was decided for the user and should be said: units assumed, fit applied, sides chosen, maps that disagree.
   std::vector<std::string> notes;
-  /// The scene file with every default filled in and every path absolute: what a trace stores, so that it replays alone.
+  /// The scene file with every default filled in and every path absolute: what a trace stores, so that it replays
+  /// alone.
   std::string canonical_json;
 };
 

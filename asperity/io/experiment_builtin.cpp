@@ -9,7 +9,9 @@
 namespace asperity {
 namespace {
 
-std::string stem(std::string_view file) { return std::string(file.substr(0, file.rfind('.'))); }
+std::string stem(std::string_view file) {
+  return std::string(file.substr(0, file.rfind('.')));
+}
 
 std::vector<BuiltinScene> list_scenes() {
   std::vector<BuiltinScene> scenes;
@@ -38,10 +40,16 @@ Result<std::string> builtin_scene_json(std::string_view name) {
     if (edit_distance(names.back(), name) == 0) return std::string(file.text);
   }
   const std::string near = nearest_name(name, names);
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in scene{}", name, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-               {}, {}, fmt::format("{}", fmt::join(names, ", "))};
+  return Error{ErrorCode::bad_value,
+               fmt::format("\"{}\" is no built-in scene{}", name,
+                           near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+               {},
+               {},
+               fmt::format("{}", fmt::join(names, ", "))};
 }
 
-std::string scene_schema_json() { return std::string(embedded_schema().front().text); }
+std::string scene_schema_json() {
+  return std::string(embedded_schema().front().text);
+}
 
 }  // namespace asperity

@@ -125,7 +125,8 @@ class CoatReader {
     const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
     Result<SceneJson> json = parse_scene_json(text, path.string());
     // A file of that name need not be about heights at all.
-    if (!json || !json->is_object() || !json->contains("height_min_m") || !json->contains("height_max_m")) return success();
+    if (!json || !json->is_object() || !json->contains("height_min_m") || !json->contains("height_max_m"))
+      return success();
     const auto number = [&](const SceneJson& value) { return value.is_number() ? value.get<double>() : std::nan(""); };
     const auto member = [&](const char* key) { return json->contains(key) ? number((*json)[key]) : std::nan(""); };
     Sidecar sidecar;
@@ -136,9 +137,12 @@ class CoatReader {
     const SceneJson pixel = json->contains("pixel_size_m") ? (*json)["pixel_size_m"] : SceneJson();
     if (pixel.is_array() && pixel.size() == 2) sidecar.pixel = Vec2(number(pixel[0]), number(pixel[1]));
     if (!sizes || !(sidecar.high >= sidecar.low) || !(sidecar.pixel.minCoeff() > 0.0) || !sidecar.pixel.allFinite()) {
-      return Error{ErrorCode::mismatch,
-                   fmt::format("does not describe the image beside it, which has {} x {} pixels", image_.width, image_.height),
-                   path.string(), {}, "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image"};
+      return Error{
+          ErrorCode::mismatch,
+          fmt::format("does not describe the image beside it, which has {} x {} pixels", image_.width, image_.height),
+          path.string(),
+          {},
+          "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image"};
     }
     sidecar_ = sidecar;
     return success();
@@ -155,7 +159,9 @@ class CoatReader {
       default:
         mapping_ = mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar;
         if (!mesh_.has_uvs()) {
-          context_.note("coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": \"triplanar\")");
+          context_.note(
+              "coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": "
+              "\"triplanar\")");
         }
     }
     wrap_ = reader_.choice("wrap", wraps, 0) == 0 ? Wrap::repeat : Wrap::clamp;
@@ -171,7 +177,8 @@ class CoatReader {
     if (text.find('%') == std::string::npos) return reader_.quantity("height", Dimension::length, fallback, range);
     Result<double> share = parse_quantity(text, Dimension::ratio);
     if (!share || !range.holds(*share)) {
-      reader_.fail("height", fmt::format("\"{}\" is no share of the mean edge", text), "\"10%\", or a length of 0 or more (m, cm, mm, um, in)");
+      reader_.fail("height", fmt::format("\"{}\" is no share of the mean edge", text),
+                   "\"10%\", or a length of 0 or more (m, cm, mm, um, in)");
       return fallback;
     }
     const double height = *share * mesh_.mean_edge();
@@ -192,7 +199,8 @@ class CoatReader {
       scale_ = {sidecar_->high - sidecar_->low, white_is_deep_ ? sidecar_->high : sidecar_->low};
       reader_.write("height", scale_.amplitude);
       reader_.write("offset", scale_.offset);
-      context_.note(fmt::format("coat: heights {} to {} from {}", format_length(sidecar_->low), format_length(sidecar_->high), sidecar_->file));
+      context_.note(fmt::format("coat: heights {} to {} from {}", format_length(sidecar_->low),
+                                format_length(sidecar_->high), sidecar_->file));
       return;
     }
     // `magnify` scales what the scene says; the default is a share of the mesh as it is.
@@ -200,7 +208,9 @@ class CoatReader {
     scale_.amplitude = read_height(fallback);
     scale_.offset = reader_.quantity("offset", Dimension::length, 0.0);
     if (!reader_.has("height") && !flat) {
-      context_.note(fmt::format("coat: no height is stated; 10 % of the mean edge is taken, {} (\"height\" chooses otherwise)", format_length(magnify_ * fallback)));
+      context_.note(
+          fmt::format("coat: no height is stated; 10 % of the mean edge is taken, {} (\"height\" chooses otherwise)",
+                      format_length(magnify_ * fallback)));
     }
   }
 
@@ -226,7 +236,8 @@ class CoatReader {
   }
 
   Result<HeightMap> image_heights() {
-    const HeightMapSettings settings{magnify_ * scale_.amplitude, magnify_ * scale_.offset, white_is_deep_, wrap_, reconstruction_};
+    const HeightMapSettings settings{magnify_ * scale_.amplitude, magnify_ * scale_.offset, white_is_deep_, wrap_,
+                                     reconstruction_};
     Result<HeightMap> heights = HeightMap::build(image_, channel_, settings);
     if (!heights) {
       Error error = std::move(heights).error().in_file(path_.string());
@@ -236,7 +247,8 @@ class CoatReader {
       return error;
     }
     if (channel_ == Channel::automatic && !heights->channel().reason.empty()) {
-      context_.note(fmt::format("coat: heights are read from the {} channel ({})", to_string(heights->channel().channel), heights->channel().reason));
+      context_.note(fmt::format("coat: heights are read from the {} channel ({})",
+                                to_string(heights->channel().channel), heights->channel().reason));
     }
     return heights;
   }
@@ -255,18 +267,25 @@ class CoatReader {
   }
 
   Status check_amplitude(const HeightMap& heights) {
-    constexpr double remesh_share = 0.2;  // hrm-2010, 5.3: beyond it the rendering becomes unstable; from 15 % on: remesh
+    constexpr double remesh_share =
+        0.2;  // hrm-2010, 5.3: beyond it the rendering becomes unstable; from 15 % on: remesh
     const double highest = std::max(std::abs(heights.lowest()), std::abs(heights.highest()));
     const double half = 0.5 * mesh_.bounds().diagonal();
     const char* key = reader_.has("height_range") ? "height_range" : (reader_.has("height") ? "height" : "height_map");
     if (highest > half) {
-      return Error{ErrorCode::bad_value, fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest), format_length(2.0 * half)),
-                   {}, reader_.place_of(key), fmt::format("heights of at most half the diagonal ({})", format_length(half))};
+      return Error{ErrorCode::bad_value,
+                   fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest),
+                               format_length(2.0 * half)),
+                   {},
+                   reader_.place_of(key),
+                   fmt::format("heights of at most half the diagonal ({})", format_length(half))};
     }
     const double range = heights.highest() - heights.lowest();
     if (range > remesh_share * mesh_.mean_edge()) {
-      context_.note(fmt::format("coat: relief of {} is {:.0f} % of the mean edge ({}); hrm-2010 found instabilities beyond 20 % and suggests geometry instead beyond 15 %",
-                                format_length(range), 100.0 * range / mesh_.mean_edge(), format_length(mesh_.mean_edge())));
+      context_.note(
+          fmt::format("coat: relief of {} is {:.0f} % of the mean edge ({}); hrm-2010 found instabilities beyond 20 % "
+                      "and suggests geometry instead beyond 15 %",
+                      format_length(range), 100.0 * range / mesh_.mean_edge(), format_length(mesh_.mean_edge())));
     }
     return success();
   }
@@ -289,12 +308,16 @@ class CoatReader {
     } else if (given == nullptr && sidecar_) {
       tile = Vec2(sidecar_->pixel.x() * heights.width(), sidecar_->pixel.y() * heights.height());
       reader_.write("tile", SceneJson::array({tile.x(), tile.y()}));
-      context_.note(fmt::format("coat: one repeat is {} x {} from {}", format_length(tile.x()), format_length(tile.y()), sidecar_->file));
+      context_.note(fmt::format("coat: one repeat is {} x {} from {}", format_length(tile.x()), format_length(tile.y()),
+                                sidecar_->file));
     } else {
       const double fallback = share * mesh_.bounds().extent().maxCoeff() / magnify_;
       const double width = reader_.quantity("tile", Dimension::length, fallback, Range::positive());
       tile = Vec2(width, width * aspect);
-      if (given == nullptr) context_.note(fmt::format("coat: one repeat of the map is {} wide, a quarter of the object (\"tile\" chooses otherwise)", format_length(magnify_ * width)));
+      if (given == nullptr)
+        context_.note(
+            fmt::format("coat: one repeat of the map is {} wide, a quarter of the object (\"tile\" chooses otherwise)",
+                        format_length(magnify_ * width)));
     }
     ASPERITY_CHECK(reader_.status());
     return Vec2(magnify_ * tile);
@@ -330,7 +353,9 @@ class CoatReader {
         }
         repeat_[static_cast<int>(i)] = (*given)[i].get<double>();
       }
-      if (given->size() != 2) reader_.fail("repeat", fmt::format("has {} numbers", given->size()), "a number above 0, or two [along s, along t]");
+      if (given->size() != 2)
+        reader_.fail("repeat", fmt::format("has {} numbers", given->size()),
+                     "a number above 0, or two [along s, along t]");
       reader_.write("repeat", *given);
       return;
     }
@@ -346,7 +371,8 @@ class CoatReader {
       const auto& uv = mesh_.uvs(face);
       const Vec2f a = uv[1] - uv[0];
       const Vec2f b = uv[2] - uv[0];
-      area += 0.5 * std::abs(static_cast<double>(a.x()) * static_cast<double>(b.y()) - static_cast<double>(a.y()) * static_cast<double>(b.x()));
+      area += 0.5 * std::abs(static_cast<double>(a.x()) * static_cast<double>(b.y()) -
+                             static_cast<double>(a.y()) * static_cast<double>(b.x()));
     }
     const double side = area > 0.0 ? std::sqrt(mesh_.report().area / area) : mesh_.mean_edge();
     return {side / repeat_.x(), side / repeat_.y()};
@@ -381,7 +407,8 @@ class CoatReader {
     const NormalAgreement agreement = compare_normals(heights, *normals, tile);
     if (const auto warning = disagreement_warning(agreement)) context_.note("coat: " + *warning);
     if (normals->degenerate_texels() > 0) {
-      context_.note(fmt::format("coat: {} texels of the normal map are no direction and count as flat", normals->degenerate_texels()));
+      context_.note(fmt::format("coat: {} texels of the normal map are no direction and count as flat",
+                                normals->degenerate_texels()));
     }
     return Mesostructure::build(std::move(heights), std::move(*normals), tile);
   }

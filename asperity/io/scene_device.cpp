@@ -65,7 +65,8 @@ Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::s
   p.max_stiffness = reader.quantity("max_stiffness", Dimension::stiffness, p.max_stiffness, Range::positive());
   p.max_damping = reader.quantity("max_damping", Dimension::damping, p.max_damping, Range::not_negative());
   p.workspace_radius = reader.quantity("workspace_radius", Dimension::length, p.workspace_radius, Range::positive());
-  p.position_resolution = reader.quantity("position_resolution", Dimension::length, p.position_resolution, Range::not_negative());
+  p.position_resolution =
+      reader.quantity("position_resolution", Dimension::length, p.position_resolution, Range::not_negative());
   p.mass = reader.quantity("mass", Dimension::mass, p.mass, Range::not_negative());
   p.damping = reader.quantity("damping", Dimension::damping, p.damping, Range::not_negative());
   p.friction = reader.quantity("friction", Dimension::force, p.friction, Range::not_negative());
@@ -99,8 +100,8 @@ Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::str
   return ScenePart<HandImpedance>{h, std::move(reader.canonical())};
 }
 
-Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place, const DeviceProfile& device,
-                                            double stiffness) {
+Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place,
+                                            const DeviceProfile& device, double stiffness) {
   static const SceneJson empty = SceneJson::object();
   static const std::vector<std::string> kinds{"ideal", "dynamic"};
   ObjectReader reader(json == nullptr ? empty : *json, place, "probe");

@@ -48,10 +48,13 @@ class DuplicateKeys {
   std::string first_;
 };
 
-/// The part of the library's message behind its prefix "[json.exception...] parse error at line 1, column 2: ".
-std::string short_message(const std::string& message) {
-  const std::size_t colon = message.find(": ");
-  return colon == std::string::npos ? message : message.substr(colon + 2);
+/// The library's message without its prefix "[json.exception...] parse error at line 1, column 2: ".
+std::string short_message(std::string message) {
+  for (const char* mark : {"] ", ": "}) {
+    const std::size_t found = message.find(mark);
+    if (found != std::string::npos) message.erase(0, found + 2);
+  }
+  return message;
 }
 
 const std::vector<std::string>& keys_of(std::string_view object) {
@@ -83,7 +86,7 @@ Result<SceneJson> parse_scene_json(std::string_view text, const std::string& nam
     const std::size_t byte = failure.byte > 0 ? failure.byte - 1 : 0;
     return malformed("is not JSON: " + short_message(failure.what()), name, line_and_column(text, byte));
   } catch (const std::exception& failure) {
-    return malformed(std::string("is not JSON: ") + failure.what(), name, {});
+    return malformed("is not JSON: " + short_message(failure.what()), name, {});
   }
 }
 
@@ -104,7 +107,8 @@ const char* json_type(const SceneJson& value) {
 }
 
 std::string Range::text() const {
-  if (std::isfinite(low) && std::isfinite(high)) return fmt::format("{}{:.4g} to {:.4g}", above_low ? "above " : "", low, high);
+  if (std::isfinite(low) && std::isfinite(high))
+    return fmt::format("{}{:.4g} to {:.4g}", above_low ? "above " : "", low, high);
   if (std::isfinite(low)) return above_low ? fmt::format("above {:.4g}", low) : fmt::format("{:.4g} or more", low);
   if (std::isfinite(high)) return fmt::format("{:.4g} or less", high);
   return "of any size";
@@ -163,7 +167,8 @@ void ObjectReader::take(std::string_view key, ObjectReader&& child) {
   }
 }
 
-double ObjectReader::value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range) {
+double ObjectReader::value_of(const SceneJson& value, const std::string& place, Dimension dimension,
+                              const Range& range) {
   const std::string units = accepted_units(dimension);
   const std::string accepted = fmt::format("a number {}{}", range.text(), units.empty() ? "" : " (" + units + ")");
   double number = 0.0;
@@ -283,7 +288,9 @@ std::size_t ObjectReader::choice(std::string_view key, std::span<const std::stri
     const auto found = std::find(names.begin(), names.end(), given);
     if (found == names.end()) {
       const std::string near = nearest_name(given, names);
-      fail(key, fmt::format("\"{}\" is not known{}", given, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)), list);
+      fail(key,
+           fmt::format("\"{}\" is not known{}", given, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+           list);
       return fallback;
     }
     answer = static_cast<std::size_t>(found - names.begin());
@@ -305,7 +312,8 @@ Vec3 ObjectReader::lengths(std::string_view key, const Vec3& fallback) {
       return fallback;
     }
     for (std::size_t i = 0; i < 3; ++i) {
-      answer[static_cast<int>(i)] = value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), Dimension::length, {});
+      answer[static_cast<int>(i)] =
+          value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), Dimension::length, {});
     }
   }
   write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
@@ -316,14 +324,15 @@ Vec3 ObjectReader::direction(std::string_view key, const Vec3& fallback) {
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;
   if (value != nullptr) {
-    const bool numbers = value->is_array() && value->size() == 3 && (*value)[0].is_number() && (*value)[1].is_number() &&
-                         (*value)[2].is_number();
+    const bool numbers = value->is_array() && value->size() == 3 && (*value)[0].is_number() &&
+                         (*value)[1].is_number() && (*value)[2].is_number();
     if (!numbers) {
       fail_type(key, *value, "three numbers [x, y, z]");
       return fallback;
     }
     for (std::size_t i = 0; i < 3; ++i) answer[static_cast<int>(i)] = (*value)[i].get<double>();
-    if (!answer.allFinite() || answer.norm() < 1e-150) fail(key, "has no direction", "three numbers that are not all 0");
+    if (!answer.allFinite() || answer.norm() < 1e-150)
+      fail(key, "has no direction", "three numbers that are not all 0");
   }
   write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
   return answer;

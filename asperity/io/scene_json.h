@@ -1,6 +1,6 @@
 #pragma once
-// Scene files are read through this: every key is asked for with its type, range and default, what was decided is written
-// into a canonical copy, and the first thing that is wrong is kept as the error. Internal to io.
+// Scene files are read through this: every key is asked for with its type, range and default, what was decided is
+// written into a canonical copy, and the first thing that is wrong is kept as the error. Internal to io.
 
 #include <cstdint>
 #include <limits>

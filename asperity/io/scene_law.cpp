@@ -60,8 +60,11 @@ Status read_mesostructure(ObjectReader& reader, const SceneContext& context, Mes
   } else if (blend != nullptr && blend->is_array()) {
     for (std::size_t i = 0; i < blend->size(); ++i) {
       if (!(*blend)[i].is_number()) {
-        return Error{ErrorCode::bad_type, fmt::format("is {}", json_type((*blend)[i])), {},
-                     fmt::format("{}[{}]", reader.place_of("blend"), i), "weights from 0 to 1"};
+        return Error{ErrorCode::bad_type,
+                     fmt::format("is {}", json_type((*blend)[i])),
+                     {},
+                     fmt::format("{}[{}]", reader.place_of("blend"), i),
+                     "weights from 0 to 1"};
       }
       law.blend_map.push_back((*blend)[i].get<double>());
     }
@@ -113,7 +116,8 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   Result<Law> law = law_by_name(type);
   if (!law) return std::move(law).error().at(place + ".type");
   const auto formulation = [&](Formulation fallback) {
-    return static_cast<Formulation>(reader.choice("formulation", formulation_names(), static_cast<std::size_t>(fallback)));
+    return static_cast<Formulation>(
+        reader.choice("formulation", formulation_names(), static_cast<std::size_t>(fallback)));
   };
   if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
     meso->formulation = formulation(meso->formulation);

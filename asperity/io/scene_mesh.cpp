@@ -78,7 +78,8 @@ class GeneratorReader {
   MeshSource icosphere_source() {
     only({"subdivisions", "radius", "mean_edge"});
     const int subdivisions = reader_.integer("subdivisions", 4, 0, 9);
-    if (reader_.has("radius") && reader_.has("mean_edge")) reader_.fail("mean_edge", "is given beside radius", "one of the two");
+    if (reader_.has("radius") && reader_.has("mean_edge"))
+      reader_.fail("mean_edge", "is given beside radius", "one of the two");
     if (!reader_.has("mean_edge")) return make([&] { return icosphere(subdivisions, length("radius", 0.04)); });
     const double edge = length("mean_edge", 0.01);
     return make([&] { return icosphere(subdivisions, icosphere_radius_for_edge(subdivisions, edge)); });
@@ -99,7 +100,8 @@ class GeneratorReader {
   MeshSource trial_b() {
     only({"columns", "rows", "mean_edge", "largest_fold"});
     const TrialMeshSettings settings = trial_settings();
-    const double fold = reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0, Range{1e-3, std::numbers::pi / 4.0});
+    const double fold = reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0,
+                                         Range{1e-3, std::numbers::pi / 4.0});
     return make([&] { return trial_mesh_b(fold, settings); });
   }
   MeshSource cup() {
@@ -131,7 +133,8 @@ class GeneratorReader {
   MeshSource box() {
     only({"size"});
     const Vec3 size = reader_.lengths("size", Vec3(0.08, 0.08, 0.08));
-    if (!(size.minCoeff() >= 1e-9 && size.maxCoeff() <= 1e9)) reader_.fail("size", "is no box", "three lengths above 0 (m, or with a unit)");
+    if (!(size.minCoeff() >= 1e-9 && size.maxCoeff() <= 1e9))
+      reader_.fail("size", "is no box", "three lengths above 0 (m, or with a unit)");
     return make([&] { return box_mesh(size); });
   }
   MeshSource blob() {
@@ -187,7 +190,8 @@ Box used_bounds(const MeshSource& source) {
   Box bounds;
   for (const auto& triangle : source.triangles) {
     for (const std::uint32_t corner : triangle) {
-      if (corner < source.positions.size() && source.positions[corner].allFinite()) bounds.include(source.positions[corner]);
+      if (corner < source.positions.size() && source.positions[corner].allFinite())
+        bounds.include(source.positions[corner]);
     }
   }
   return bounds;
@@ -227,10 +231,12 @@ double read_fit(ObjectReader& surface, bool by_default, const SceneContext& cont
 }
 
 void note_fit(const MeshPart& part, const Vec3& extent, double scale, const SceneContext& context, std::string& note) {
-  note = fmt::format("mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace radius of {} "
-                     "(\"units\" or \"fit\" choose otherwise)",
-                     part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
-                     format_length(scale * extent.z()), context.device.name);
+  note = fmt::format(
+      "mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
+      "radius of {} "
+      "(\"units\" or \"fit\" choose otherwise)",
+      part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
+      format_length(scale * extent.z()), context.device.name);
 }
 
 }  // namespace

@@ -42,14 +42,14 @@ Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::str
 
 struct ProbeSettings {
   bool dynamic = false;
-  double radius = 0.0;  ///< m
-  double rate = 1000.0; ///< Hz
+  double radius = 0.0;   ///< m
+  double rate = 1000.0;  ///< Hz
   IdealProbeSettings ideal;
   SimulatedDeviceSettings simulated;
 };
 /// `stiffness`: of what is touched (N/m), the default estimate of the ideal probe's regulator. [build]
-Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place, const DeviceProfile& device,
-                                            double stiffness);
+Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place,
+                                            const DeviceProfile& device, double stiffness);
 
 /// Text (a law's name) or object. [build]
 Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place, const SceneContext& context);
@@ -58,8 +58,8 @@ SceneJson law_json(const Law& law);
 
 /// A mesh before it is built: placed, scaled, its axis turned up. [build]
 struct MeshPart {
-  MeshSource source;     ///< m
-  std::string name;      ///< what the surface is called unless the scene says otherwise
+  MeshSource source;  ///< m
+  std::string name;   ///< what the surface is called unless the scene says otherwise
   bool from_file = false;
 };
 /// Reads `mesh`, `units`, `fit` and `up` of a surface. Sets an error in `surface` or answers one. [build]

@@ -101,7 +101,8 @@ class StrokeReader {
 
   Status read_recorded() {
     const std::string file = reader_.text("path", "");
-    if (!reader_.failed() && file.empty()) reader_.fail("path", "is missing", "a CSV file with time, x, y, z, or a trace");
+    if (!reader_.failed() && file.empty())
+      reader_.fail("path", "is missing", "a CSV file with time, x, y, z, or a trace");
     ASPERITY_CHECK(reader_.status());
     const std::string path = context_.resolve(file).string();
     Result<std::vector<TimedPoint>> recorded = read_recorded_path(path);
@@ -126,8 +127,10 @@ class StrokeReader {
     } else {
       stroke_.depth = reader_.quantity("depth", Dimension::length, stroke_.depth);
     }
-    stroke_.approach_height = reader_.quantity("approach_height", Dimension::length, stroke_.approach_height, Range::not_negative());
-    stroke_.approach_speed = reader_.quantity("approach_speed", Dimension::speed, stroke_.approach_speed, Range::positive());
+    stroke_.approach_height =
+        reader_.quantity("approach_height", Dimension::length, stroke_.approach_height, Range::not_negative());
+    stroke_.approach_speed =
+        reader_.quantity("approach_speed", Dimension::speed, stroke_.approach_speed, Range::positive());
     stroke_.repeats = reader_.integer("repeats", 1, 1, 100000);
     stroke_.back_and_forth = reader_.boolean("back_and_forth", false);
   }
@@ -192,7 +195,8 @@ class StrokeReader {
     if (text.find('%') == std::string::npos) return reader_.quantity(key, Dimension::length, fallback, range);
     Result<double> share = parse_quantity(text, Dimension::ratio);
     if (!share || !range.holds(*share)) {
-      reader_.fail(key, fmt::format("\"{}\" is no share of the object's largest side", text), "\"30%\", or a length above 0");
+      reader_.fail(key, fmt::format("\"{}\" is no share of the object's largest side", text),
+                   "\"30%\", or a length above 0");
       return fallback;
     }
     const double length = *share * bounds_.extent().maxCoeff();

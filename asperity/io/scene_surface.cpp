@@ -19,11 +19,13 @@ Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
   pose.position = reader.lengths("position", Vec3::Zero());
   if (const SceneJson* q = reader.raw("orientation")) {
     reader.refuse({"axis", "angle"}, "beside orientation");
-    const bool numbers = q->is_array() && q->size() == 4 && std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
+    const bool numbers = q->is_array() && q->size() == 4 &&
+                         std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
     if (!numbers) {
       reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
     } else {
-      pose.orientation = Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
+      pose.orientation =
+          Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
       const double norm = pose.orientation.norm();
       if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
       // Written and read again, an orientation keeps its bits.
@@ -48,12 +50,14 @@ Result<Material> read_material(const SceneJson* json, ObjectReader& surface, Sce
   ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("material"), "material");
   const DeviceProfile& device = context.device;
   Material material;
-  material.stiffness = reader.quantity("stiffness", Dimension::stiffness, std::min(preferred_stiffness, device.max_stiffness), Range::positive());
+  material.stiffness = reader.quantity("stiffness", Dimension::stiffness,
+                                       std::min(preferred_stiffness, device.max_stiffness), Range::positive());
   material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
   ASPERITY_CHECK(reader.status());
   if (material.stiffness > device.max_stiffness) {
-    context.note(fmt::format("material: a stiffness of {:g} N/m is more than the {:g} N/m that {} renders without buzzing", material.stiffness,
-                             device.max_stiffness, device.name));
+    context.note(
+        fmt::format("material: a stiffness of {:g} N/m is more than the {:g} N/m that {} renders without buzzing",
+                    material.stiffness, device.max_stiffness, device.name));
   }
   surface.take("material", std::move(reader));
   return material;
@@ -68,7 +72,10 @@ Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& c
   }
   const Sides sides = mesh.natural_sides();
   if (sides == Sides::both) {
-    context.note(fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" chooses otherwise)", name));
+    context.note(
+        fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" "
+                    "chooses otherwise)",
+                    name));
   }
   return sides;
 }

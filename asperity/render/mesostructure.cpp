@@ -1,5 +1,6 @@
 // Mesostructure-blended rendering: Algorithm 2 of hrm-2010.
 
+#include <algorithm>
 #include <cmath>
 
 #include "asperity/render/law_forces.h"
@@ -23,6 +24,20 @@ FaceWeight face_weight(const MesostructureLaw& law, const BarycentricFrame& fram
     answer.gradient += value[k].slope * value[(k + 1) % 3].weight * value[(k + 2) % 3].weight * frame.gradient[k];
   }
   return answer;
+}
+
+/// Fades a face out where its plane runs away from the base, over twice the band: the projection of a probe under one side
+/// of a sharp fold can fall into the face on the other, whose plane says nothing about the depth there. On flat
+/// parts, and where two faces are equally near, it is 1 with a gradient of 0, so that Phi stays as smooth as it is.
+FaceWeight nearness(const MesostructureLaw& law, const BarycentricFrame& frame, double height, const BaseFoot& foot) noexcept {
+  double steepest = 0.0;
+  for (const Vec3& gradient : frame.gradient) steepest = std::max(steepest, gradient.norm());
+  const double per_width = steepest / (2.0 * law.rho);
+  const double excess = height - foot.signed_distance;
+  const double t = 1.0 - std::abs(excess) * per_width;
+  if (t <= 0.0) return {0.0, Vec3::Zero()};
+  const double slope = -6.0 * t * (1.0 - t) * per_width * (excess < 0.0 ? -1.0 : 1.0);
+  return {t * t * (3.0 - 2.0 * t), slope * (frame.normal - foot.up)};
 }
 
 /// Lines 4 to 34 as printed, with three liberties that the text leaves no way around: the weight function (undefined there), the
@@ -93,10 +108,14 @@ LawForce consistent_force(const MesostructureLaw& law, const ReliefSurface& surf
   for_each_adjoining_face(mesh, foot.nearest.element, [&](std::uint32_t face) {
     const BarycentricFrame frame = barycentric_frame(mesh, face);
     const Vec3 coordinates = frame.coordinates(probe);
-    const FaceWeight weight = face_weight(law, frame, coordinates);
+    const FaceWeight across = face_weight(law, frame, coordinates);
+    if (across.weight <= 0.0) return;
+    const double height = frame.height(probe);
+    const FaceWeight near = nearness(law, frame, height, foot);
+    const FaceWeight weight{across.weight * near.weight, near.weight * across.gradient + across.weight * near.gradient};
     if (weight.weight <= 0.0) return;
     const CoatSample sample = surface.coat().sample(mesh, face, coordinates);
-    const double phi = frame.height(probe) - sample.height;
+    const double phi = height - sample.height;
     weights += weight.weight;
     values += weight.weight * phi;
     heights += weight.weight * sample.height;

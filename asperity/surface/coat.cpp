@@ -86,6 +86,10 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostr
   const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
   const std::uint32_t stride = std::max(1U, faces / 4096U);
   for (std::uint32_t face = 0; face < faces; face += stride) {
+    const auto corners = corner_coordinates(mesh, face, settings);
+    const Vec2 one = corners[1] - corners[0];
+    const Vec2 other = corners[2] - corners[0];
+    if (one.x() * other.y() == one.y() * other.x()) continue;
     const TextureFrame texture = texture_frame(mesh, face, barycentric_frame(mesh, face), Vec3(1.0, 0.0, 0.0), settings);
     const double texels = std::max(texture.gradient_s.norm() * heights.width(), texture.gradient_t.norm() * heights.height());
     if (texels > 0.0 && std::isfinite(texels)) sizes.push_back(1.0 / texels);

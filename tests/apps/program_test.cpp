@@ -34,8 +34,8 @@ struct Call {
 class Program : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("asperity-program-" + std::to_string(::getpid()) + "-" + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = fs::temp_directory_path() / ("asperity-program-" + std::to_string(::getpid()) + "-" +
+                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::create_directories(folder_);
     MeshSource ball = icosphere(2, 3.0);
     ball.corner_uvs.clear();
@@ -44,19 +44,24 @@ class Program : public ::testing::Test {
     for (int i = 0; i < 64; ++i) map.samples.push_back(static_cast<std::uint16_t>(i * 4));
     ASSERT_TRUE(write_png(folder_ / "map.png", map).ok());
     // Half a second of touch, so that the tests are quick.
-    write("quick.json", R"({"name":"quick","surfaces":[{"mesh":{"generator":"M_a"},"coat":{"height_map":{"generator":"H_3","size":64},"height":"1mm"}}],
+    write(
+        "quick.json",
+        R"({"name":"quick","surfaces":[{"mesh":{"generator":"M_a"},"coat":{"height_map":{"generator":"H_3","size":64},"height":"1mm"}}],
       "stroke":{"type":"line","start":["40%","100%","30%"],"end":["50%","100%","30%"],"speed":"40mm/s","approach_height":"1mm","approach_speed":"20mm/s"}})");
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
   [[nodiscard]] std::string read(const fs::path& file) const {
     std::ifstream stream(folder_ / file, std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   }
   /// Runs `asperity ARGUMENTS` in the test's folder.
   [[nodiscard]] Call run(const std::string& arguments) const {
-    const std::string line = "cd '" + folder_.string() + "' && '" ASPERITY_PROGRAM "' " + arguments + " >.out 2>.err </dev/null";
+    const std::string line =
+        "cd '" + folder_.string() + "' && '" ASPERITY_PROGRAM "' " + arguments + " >.out 2>.err </dev/null";
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(".out"), read(".err")};
   }
@@ -93,7 +98,8 @@ TEST_F(Program, TouchWritesTraceNumbersAndReport) {
   const Call call = run("touch quick.json");
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_LE(std::count(call.out.begin(), call.out.end(), '\n'), 12);
-  for (const char* part : {"quick", "mesostructure", "force", "height", "p99.9", "flags", "out/quick/report.html"}) EXPECT_TRUE(has(call.out, part)) << part;
+  for (const char* part : {"quick", "mesostructure", "force", "height", "p99.9", "flags", "out/quick/report.html"})
+    EXPECT_TRUE(has(call.out, part)) << part;
   const std::string page = read("out/quick/report.html");
   EXPECT_TRUE(has(page, "<html")) << page.size();
   const json numbers = json::parse(read("out/quick/run.json"));
@@ -104,7 +110,8 @@ TEST_F(Program, TouchWritesTraceNumbersAndReport) {
   EXPECT_TRUE(trace->complete);
   EXPECT_EQ(numbers["ticks"].get<std::size_t>(), trace->records.size());
   EXPECT_EQ(numbers["force_hash"].get<std::string>(), format_hash(force_hash(trace->records)));
-  for (const auto& file : fs::recursive_directory_iterator(folder_ / "out")) EXPECT_NE(file.path().extension(), ".part");
+  for (const auto& file : fs::recursive_directory_iterator(folder_ / "out"))
+    EXPECT_NE(file.path().extension(), ".part");
 }
 
 TEST_F(Program, TouchTwiceIsBitEqual) {
@@ -122,7 +129,9 @@ TEST_F(Program, AMeshAndAMapAreEnough) {
   ASSERT_EQ(bare.code, 0) << bare.err;
   EXPECT_EQ(json::parse(bare.out)["law"], "god-object");
   EXPECT_TRUE(has(bare.err, "states no unit"));
-  const Call relief = run("touch ball.obj --relief map.png --height 0.5mm --tile 20mm --no-report --json --speed 100mm/s --csv --device omega.7 --force 1N");
+  const Call relief =
+      run("touch ball.obj --relief map.png --height 0.5mm --tile 20mm --no-report --json --speed 100mm/s --csv "
+          "--device omega.7 --force 1N");
   ASSERT_EQ(relief.code, 0) << relief.err;
   const json document = json::parse(relief.out);
   EXPECT_EQ(document["law"], "mesostructure");
@@ -134,9 +143,13 @@ TEST_F(Program, AMeshAndAMapAreEnough) {
 }
 
 TEST_F(Program, EveryOptionReachesTheScene) {
-  ASSERT_EQ(run("touch ball.obj --relief map.png --height 1mm --tile 9mm --channel luminance --white-is deep --mapping triplanar --magnify 0.5 "
-                "--units cm --fit 60mm --up z --law height-field --stiffness 500 --damping 0.25 --depth 0.5mm --speed 200mm/s --device falcon "
-                "--hand firm --rate 500 --probe dynamic --no-report --out o").code, 0);
+  ASSERT_EQ(run("touch ball.obj --relief map.png --height 1mm --tile 9mm --channel luminance --white-is deep --mapping "
+                "triplanar --magnify 0.5 "
+                "--units cm --fit 60mm --up z --law height-field --stiffness 500 --damping 0.25 --depth 0.5mm --speed "
+                "200mm/s --device falcon "
+                "--hand firm --rate 500 --probe dynamic --no-report --out o")
+                .code,
+            0);
   const Result<Trace> trace = read_trace((folder_ / "o/trace.asptrace").string());
   ASSERT_TRUE(trace.ok());
   const json scene = json::parse(trace->metadata.scene);
@@ -160,6 +173,15 @@ TEST_F(Program, EveryOptionReachesTheScene) {
   EXPECT_EQ(scene["probe"]["rate"], 500.0);
   EXPECT_EQ(scene["probe"]["kind"], "dynamic");
   EXPECT_EQ(run("replay o/trace.asptrace").code, 0);
+  // What described the scene's own map does not describe another one: its height is the default again.
+  std::string low = read("quick.json");
+  low.replace(low.find("\"1mm\"}"), 6, "\".3mm\"");
+  write("low.json", low);
+  ASSERT_EQ(run("touch low.json --relief map.png --no-report --out r").code, 0);
+  EXPECT_NEAR(
+      json::parse(read_trace((folder_ / "r/trace.asptrace").string())->metadata.scene)["surfaces"][0]["coat"]["height"]
+          .get<double>(),
+      1e-3, 1e-9);
   ASSERT_EQ(run("touch ball.obj --probe-radius 1mm --speed 200mm/s --no-report --out p").code, 0);
   EXPECT_EQ(json::parse(read_trace((folder_ / "p/trace.asptrace").string())->metadata.scene)["probe"]["radius"], 0.001);
 }
@@ -203,7 +225,8 @@ TEST_F(Program, CompareSetsLawsSideBySide) {
   EXPECT_TRUE(has(read("out/quick-compare/report.html"), "<html"));
   const Call table = run("compare quick.json --no-report --out t");
   ASSERT_EQ(table.code, 0) << table.err;
-  for (const char* part : {"force-shading", "height-field", "mesostructure", "direction", "energy/loop"}) EXPECT_TRUE(has(table.out, part)) << part;
+  for (const char* part : {"force-shading", "height-field", "mesostructure", "direction", "energy/loop"})
+    EXPECT_TRUE(has(table.out, part)) << part;
 }
 
 TEST_F(Program, InspectKnowsEveryKindOfFile) {
@@ -279,6 +302,7 @@ TEST_F(Program, BadInput) {
   write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   write("nothing.png", "");
   refused("touch absent.obj", {"absent.obj", "no such file"});
+  refused("touch map.png", {"map.png", "is a picture", "--relief"});
   refused("touch icospher", {"did you mean \"icosphere\""});
   refused("touch empty.json", {"empty.json", "is empty"});
   refused("touch broken.json", {"broken.json", "line 2, column 15"});

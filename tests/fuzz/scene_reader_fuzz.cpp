@@ -20,8 +20,10 @@ void require(bool holds, const char* what) {
 
 /// Sizes that would take seconds: legal, but no use here.
 bool takes_long(const nlohmann::json& json) {
-  if (json.is_number()) return json.get<double>() > 300.0;
-  if (json.is_object() && json.contains("subdivisions") && json["subdivisions"].is_number() && json["subdivisions"].get<double>() > 3.0) return true;
+  if (json.is_number()) return json.get<double>() > 100.0;
+  if (json.is_object() && json.contains("subdivisions") && json["subdivisions"].is_number() &&
+      json["subdivisions"].get<double>() > 3.0)
+    return true;
   if (!json.is_structured()) return false;
   for (const auto& item : json) {
     if (takes_long(item)) return true;

@@ -22,7 +22,8 @@ class ExperimentErrors : public ExperimentTest {
     expect(R"({"surfaces":[{"mesh":{"generator":"box"},)" + keys + "}]}", code, place, part);
   }
   void coat(const std::string& keys, ErrorCode code, const std::string& place, const std::string& part) {
-    expect(R"({"surfaces":[{"mesh":"sphere.ply","coat":{)" + keys + "}}]}", code, place.empty() ? place : "surfaces[0].coat" + place, part);
+    expect(R"({"surfaces":[{"mesh":"sphere.ply","coat":{)" + keys + "}}]}", code,
+           place.empty() ? place : "surfaces[0].coat" + place, part);
   }
   void stroke(const std::string& keys, ErrorCode code, const std::string& place, const std::string& part) {
     expect(R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{)" + keys + "}}", code, place, part);
@@ -33,7 +34,9 @@ class ExperimentErrors : public ExperimentTest {
 };
 
 TEST_F(ExperimentErrors, Files) {
-  const auto message = [](const Result<Experiment>& result) { return result.ok() ? std::string() : result.error().message(); };
+  const auto message = [](const Result<Experiment>& result) {
+    return result.ok() ? std::string() : result.error().message();
+  };
   const Result<Experiment> missing = read_experiment(folder_ / "absent.json");
   ASSERT_FALSE(missing.ok());
   EXPECT_EQ(missing.error().code, ErrorCode::file_missing);
@@ -60,7 +63,8 @@ TEST_F(ExperimentErrors, UnknownKeysSuggest) {
   surface(R"("fitt":"none")", ErrorCode::bad_key, "surfaces[0].fitt", "did you mean \"fit\"?");
   coat(R"("heigth":1)", ErrorCode::bad_key, ".heigth", "did you mean \"height\"?");
   stroke(R"("spede":1)", ErrorCode::bad_key, "stroke.spede", "did you mean \"speed\"?");
-  surface(R"("material":{"stifness":1})", ErrorCode::bad_key, "surfaces[0].material.stifness", "did you mean \"stiffness\"?");
+  surface(R"("material":{"stifness":1})", ErrorCode::bad_key, "surfaces[0].material.stifness",
+          "did you mean \"stiffness\"?");
   surface(R"("wholly_unlike_any":1)", ErrorCode::bad_key, "surfaces[0].wholly_unlike_any", "accepted: name, mesh");
 }
 
@@ -89,11 +93,15 @@ TEST_F(ExperimentErrors, Surfaces) {
   expect(R"({"surfaces":[{}]})", ErrorCode::bad_value, "surfaces[0].mesh", "is missing");
   expect(R"({"surfaces":[{"mesh":3}]})", ErrorCode::bad_type, "surfaces[0].mesh", "is a number");
   expect(R"({"surfaces":[{"mesh":"absent.obj"}]})", ErrorCode::file_missing, "surfaces[0].mesh", "absent.obj");
-  expect(R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})", ErrorCode::bad_value, "surfaces[0].mesh.generator", "did you mean \"icosphere\"");
+  expect(R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})", ErrorCode::bad_value, "surfaces[0].mesh.generator",
+         "did you mean \"icosphere\"");
   expect(R"({"surfaces":[{"mesh":{}}]})", ErrorCode::bad_value, "surfaces[0].mesh.generator", "is missing");
-  expect(R"({"surfaces":[{"mesh":{"generator":"box","radius":1}}]})", ErrorCode::bad_key, "surfaces[0].mesh.radius", "is not read by this generator");
-  expect(R"({"surfaces":[{"mesh":{"generator":"icosphere","subdivisions":10}}]})", ErrorCode::bad_value, "surfaces[0].mesh.subdivisions", "0 to 9");
-  expect(R"({"surfaces":[{"mesh":{"generator":"icosphere","subdivisions":1.5}}]})", ErrorCode::bad_value, "surfaces[0].mesh.subdivisions", "whole number");
+  expect(R"({"surfaces":[{"mesh":{"generator":"box","radius":1}}]})", ErrorCode::bad_key, "surfaces[0].mesh.radius",
+         "is not read by this generator");
+  expect(R"({"surfaces":[{"mesh":{"generator":"icosphere","subdivisions":10}}]})", ErrorCode::bad_value,
+         "surfaces[0].mesh.subdivisions", "0 to 9");
+  expect(R"({"surfaces":[{"mesh":{"generator":"icosphere","subdivisions":1.5}}]})", ErrorCode::bad_value,
+         "surfaces[0].mesh.subdivisions", "whole number");
   surface(R"("units":"mm")", ErrorCode::bad_key, "surfaces[0].units", "generated mesh");
   surface(R"("fit":"workspce")", ErrorCode::bad_value, "surfaces[0].fit", "\"workspace\", \"none\"");
   surface(R"("fit":0)", ErrorCode::bad_value, "surfaces[0].fit", "above 0");
@@ -102,14 +110,18 @@ TEST_F(ExperimentErrors, Surfaces) {
   surface(R"("sides":"back")", ErrorCode::bad_value, "surfaces[0].sides", "\"front\"");
   surface(R"("search":"grid")", ErrorCode::bad_value, "surfaces[0].search", "\"octree\"");
   surface(R"("pose":{"position":[1,2]})", ErrorCode::bad_value, "surfaces[0].pose.position", "has 2 numbers");
-  surface(R"("pose":{"position":[1,"2 N",3]})", ErrorCode::bad_value, "surfaces[0].pose.position[1]", "unknown unit \"N\"");
+  surface(R"("pose":{"position":[1,"2 N",3]})", ErrorCode::bad_value, "surfaces[0].pose.position[1]",
+          "unknown unit \"N\"");
   surface(R"("pose":{"orientation":[0,0,0,0]})", ErrorCode::bad_value, "surfaces[0].pose.orientation", "no rotation");
   surface(R"("pose":{"axis":[0,0,0],"angle":1})", ErrorCode::bad_value, "surfaces[0].pose.axis", "no direction");
-  surface(R"("material":{"stiffness":0})", ErrorCode::bad_value, "surfaces[0].material.stiffness", "above 0 (N/m, N/mm)");
-  surface(R"("material":{"damping":"x"})", ErrorCode::bad_value, "surfaces[0].material.damping", "does not start with a number");
+  surface(R"("material":{"stiffness":0})", ErrorCode::bad_value, "surfaces[0].material.stiffness",
+          "above 0 (N/m, N/mm)");
+  surface(R"("material":{"damping":"x"})", ErrorCode::bad_value, "surfaces[0].material.damping",
+          "does not start with a number");
   surface(R"("law":"mesostructur")", ErrorCode::bad_value, "surfaces[0].law", "did you mean \"mesostructure\"?");
   surface(R"("law":"mesostructure")", ErrorCode::unsupported_pair, "surfaces[0].law", "needs a coat");
-  surface(R"("law":{"type":"god-object","rho":0.1})", ErrorCode::bad_key, "surfaces[0].law.rho", "is not read by the law");
+  surface(R"("law":{"type":"god-object","rho":0.1})", ErrorCode::bad_key, "surfaces[0].law.rho",
+          "is not read by the law");
   surface(R"("law":{"rho":0.5})", ErrorCode::bad_value, "surfaces[0].law.rho", "0.3333");
   surface(R"("law":{"blend":"cubic"})", ErrorCode::bad_value, "surfaces[0].law.blend", "s_shape");
   surface(R"("law":{"blend":[0.5]})", ErrorCode::bad_value, "surfaces[0].law.blend_map", "two");
@@ -134,7 +146,8 @@ TEST_F(ExperimentErrors, Coats) {
   coat(R"("height_map":3)", ErrorCode::bad_type, ".height_map", "is a number");
   coat(R"("height_map":"absent.png")", ErrorCode::file_missing, ".height_map", "absent.png");
   coat(R"("height_map":{"generator":"H_9"})", ErrorCode::bad_value, ".height_map.generator", "H_9");
-  coat(R"("height_map":{"generator":"H_3","count":3})", ErrorCode::bad_key, ".height_map.count", "is not read by this generator");
+  coat(R"("height_map":{"generator":"H_3","count":3})", ErrorCode::bad_key, ".height_map.count",
+       "is not read by this generator");
   coat(R"("height_map":{"generator":"H_3"},"channel":"red")", ErrorCode::bad_key, ".channel", "generated height map");
   coat(R"("height_map":"map.png","channel":"red")", ErrorCode::bad_map, ".channel", "map.png");
   coat(R"("height_map":"map.png","height":-1)", ErrorCode::bad_value, ".height", "0 or more");
@@ -144,7 +157,8 @@ TEST_F(ExperimentErrors, Coats) {
   coat(R"("height_map":"map.png","height_range":[0,1])", ErrorCode::bad_value, ".height_range", "half the diagonal");
   coat(R"("height_map":"map.png","height_range":[1,0])", ErrorCode::bad_value, ".height_range", "higher end first");
   coat(R"("height_map":"map.png","height_range":[0,"x"])", ErrorCode::bad_value, ".height_range[1]", "number");
-  coat(R"("height_map":"map.png","height_range":[0,1e-3],"height":1)", ErrorCode::bad_key, ".height", "beside height_range");
+  coat(R"("height_map":"map.png","height_range":[0,1e-3],"height":1)", ErrorCode::bad_key, ".height",
+       "beside height_range");
   coat(R"("height_map":"map.png","tile":0)", ErrorCode::bad_value, ".tile", "above 0");
   coat(R"("height_map":"map.png","tile":[1e-3])", ErrorCode::bad_value, ".tile", "has 1 lengths");
   coat(R"("height_map":"map.png","repeat":2)", ErrorCode::bad_key, ".repeat", "triplanar");
@@ -161,8 +175,8 @@ TEST_F(ExperimentErrors, Coats) {
 }
 
 TEST_F(ExperimentErrors, ProbesWithRadiusNeedALawThatTakesThem) {
-  expect(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png"}}],"probe":{"radius":"1mm"}})", ErrorCode::unsupported_pair,
-         "surfaces[0].law", "touches with a point");
+  expect(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png"}}],"probe":{"radius":"1mm"}})",
+         ErrorCode::unsupported_pair, "surfaces[0].law", "touches with a point");
 }
 
 TEST_F(ExperimentErrors, Strokes) {

@@ -22,8 +22,9 @@ namespace asperity {
 class ExperimentTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("asperity-" + std::to_string(::getpid()) + "-" + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ =
+        std::filesystem::temp_directory_path() / ("asperity-" + std::to_string(::getpid()) + "-" +
+                                                  ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder_);
     // OBJ files carry texture coordinates, PLY files of a sphere here do not.
     MeshSource sphere = icosphere(2, 3.0);
@@ -49,8 +50,12 @@ class ExperimentTest : public ::testing::Test {
     return image;
   }
 
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-  [[nodiscard]] Result<Experiment> parse(const std::string& json) const { return parse_experiment(json, folder_, "scene.json"); }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  [[nodiscard]] Result<Experiment> parse(const std::string& json) const {
+    return parse_experiment(json, folder_, "scene.json");
+  }
   /// A scene that is expected to be good.
   [[nodiscard]] Experiment good(const std::string& json) const {
     Result<Experiment> experiment = parse(json);
@@ -77,8 +82,8 @@ class ExperimentTest : public ::testing::Test {
     SessionSettings settings;
     settings.dt = Seconds(1.0 / experiment.rate);
     settings.max_ticks = ticks;
-    run_session([&](const ProbeSample& p, Seconds dt) { return step(experiment.scene, state, p, dt); }, *probe, *safety, settings,
-                [&](const TraceRecord& record) { hash.add(record); });
+    run_session([&](const ProbeSample& p, Seconds dt) { return step(experiment.scene, state, p, dt); }, *probe, *safety,
+                settings, [&](const TraceRecord& record) { hash.add(record); });
     return hash.value();
   }
 

@@ -44,7 +44,8 @@ TEST_F(ExperimentScene, UnitsAndFitDecideTheSize) {
 TEST_F(ExperimentScene, TheUpAxisTurnsExactly) {
   // A flat sheet stays exactly flat whichever way it is turned, and its normals point to +y.
   for (const char* up : {"x", "y", "z", "-x", "-y", "-z"}) {
-    const Experiment e = good(std::string(R"({"surfaces":[{"mesh":{"generator":"box","size":[0.01,0.02,0.03]},"up":")") + up + "\"}]}");
+    const Experiment e =
+        good(std::string(R"({"surfaces":[{"mesh":{"generator":"box","size":[0.01,0.02,0.03]},"up":")") + up + "\"}]}");
     const TriangleMesh& mesh = base_mesh(e.scene.instances()[0].surface);
     EXPECT_GT(mesh.report().signed_volume, 0.0) << up;
     const int axis = up[up[0] == '-' ? 1 : 0] - 'x';
@@ -53,11 +54,13 @@ TEST_F(ExperimentScene, TheUpAxisTurnsExactly) {
   }
   const Experiment sheet = good(R"({"surfaces":[{"mesh":{"generator":"M_a"}}]})");
   const TriangleMesh& mesh = base_mesh(sheet.scene.instances()[0].surface);
-  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) ASSERT_EQ(mesh.face_normal(face), Vec3(0.0, 1.0, 0.0));
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face)
+    ASSERT_EQ(mesh.face_normal(face), Vec3(0.0, 1.0, 0.0));
 }
 
 TEST_F(ExperimentScene, ThePosePlacesAndTurns) {
-  const Experiment e = good(R"({"surfaces":[{"mesh":{"generator":"box"},"pose":{"position":["10mm",0,0],"axis":[0,0,2],"angle":"90deg"}}]})");
+  const Experiment e = good(
+      R"({"surfaces":[{"mesh":{"generator":"box"},"pose":{"position":["10mm",0,0],"axis":[0,0,2],"angle":"90deg"}}]})");
   const Pose& pose = e.scene.instances()[0].world_from_object;
   EXPECT_NEAR((pose.apply(Vec3(1.0, 0.0, 0.0)) - Vec3(0.01, 1.0, 0.0)).norm(), 0.0, 1e-12);
   const Experiment q = good(R"({"surfaces":[{"mesh":{"generator":"box"},"pose":{"orientation":[2,0,0,0]}}]})");
@@ -65,19 +68,22 @@ TEST_F(ExperimentScene, ThePosePlacesAndTurns) {
 }
 
 TEST_F(ExperimentScene, ACoatChoosesItsMappingAndLaw) {
-  const Experiment bare = good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"1mm"}}]})");
+  const Experiment bare =
+      good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"1mm"}}]})");
   EXPECT_EQ(coat_of(bare).settings().mapping, Mapping::triplanar);
   EXPECT_EQ(law_name(bare.scene.instances()[0].law), "mesostructure");
-  EXPECT_NEAR(coat_of(bare).maps().tile().x(), 0.025, 1e-12);           // a quarter of the object
-  EXPECT_NEAR(coat_of(bare).maps().tile().y(), 0.0125, 1e-12);          // square pixels of a 16 x 8 map
+  EXPECT_NEAR(coat_of(bare).maps().tile().x(), 0.025, 1e-12);   // a quarter of the object
+  EXPECT_NEAR(coat_of(bare).maps().tile().y(), 0.0125, 1e-12);  // square pixels of a 16 x 8 map
   EXPECT_TRUE(has_note(bare, "triplanar"));
-  const Experiment mapped = good(R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png","height":"1mm"}}]})");
+  const Experiment mapped =
+      good(R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png","height":"1mm"}}]})");
   EXPECT_EQ(coat_of(mapped).settings().mapping, Mapping::uv);
 }
 
 TEST_F(ExperimentScene, HeightsAreReadInEveryWay) {
   const auto heights = [&](const std::string& keys) {
-    const Experiment e = good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"filter":"nearest","height_map":"map.png",)" + keys + "}}]}");
+    const Experiment e =
+        good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"filter":"nearest","height_map":"map.png",)" + keys + "}}]}");
     return std::pair(coat_of(e).lowest(), coat_of(e).highest());
   };
   const auto expect_range = [&](const std::string& keys, double low, double high) {
@@ -97,7 +103,8 @@ TEST_F(ExperimentScene, HeightsAreReadInEveryWay) {
 }
 
 TEST_F(ExperimentScene, ASidecarGivesTheScale) {
-  const std::string scene = R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","filter":"nearest","magnify":1000}}]})";
+  const std::string scene =
+      R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","filter":"nearest","magnify":1000}}]})";
   write("map.json", R"({"width":16,"height":8,"pixel_size_m":[2e-6,1e-6],"height_min_m":-1e-6,"height_max_m":2e-6})");
   const Experiment e = good(scene);
   EXPECT_NEAR(coat_of(e).lowest(), -1e-3, 1e-9);
@@ -125,12 +132,15 @@ TEST_F(ExperimentScene, AFlatNormalMapUnderARampIsNoted) {
 }
 
 TEST_F(ExperimentScene, ATallReliefIsNoted) {
-  EXPECT_TRUE(has_note(good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"60%"}}]})"), "mean edge"));
-  EXPECT_FALSE(has_note(good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"5%"}}]})"), "mean edge"));
+  EXPECT_TRUE(has_note(good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"60%"}}]})"),
+                       "mean edge"));
+  EXPECT_FALSE(has_note(good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"5%"}}]})"),
+                        "mean edge"));
 }
 
 TEST_F(ExperimentScene, DeviceHandAndProbeTakeNamesOrObjects) {
-  const Experiment e = good(R"({"surfaces":[{"mesh":{"generator":"box"}}],"device":{"profile":"falcon","max_force":"6 N"},
+  const Experiment e =
+      good(R"({"surfaces":[{"mesh":{"generator":"box"}}],"device":{"profile":"falcon","max_force":"6 N"},
     "hand":{"preset":"firm","mass":"300 g"},"probe":{"kind":"dynamic","radius":"1mm","rate":"2kHz","dynamic":{"tremor":"20um","seed":9}}})");
   EXPECT_EQ(e.device.max_force, 6.0);
   EXPECT_EQ(e.device.max_stiffness, find_profile("falcon")->max_stiffness);
@@ -144,7 +154,8 @@ TEST_F(ExperimentScene, DeviceHandAndProbeTakeNamesOrObjects) {
   const Experiment soft = good(R"({"surfaces":[{"mesh":{"generator":"box"}}],"device":"touch"})");
   EXPECT_EQ(soft.scene.instances()[0].material.stiffness, 400.0);
   EXPECT_EQ(soft.ideal.stiffness_estimate, 400.0);
-  EXPECT_TRUE(has_note(good(R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"stiffness":900}}],"device":"touch"})"), "900"));
+  EXPECT_TRUE(has_note(
+      good(R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"stiffness":900}}],"device":"touch"})"), "900"));
 }
 
 TEST_F(ExperimentScene, StrokesTakeSharesOfTheBounds) {
@@ -154,7 +165,8 @@ TEST_F(ExperimentScene, StrokesTakeSharesOfTheBounds) {
   EXPECT_NEAR((e.stroke.end - Vec3(0.01, 0.1, 0.075)).norm(), 0.0, 1e-15);
   EXPECT_EQ(e.stroke.press, PressMode::force);
   EXPECT_EQ(e.stroke.normal_force, 2.0);
-  const Experiment circle = good(R"({"surfaces":[{"mesh":{"generator":"box","size":[0.1,0.2,0.3]}}],"stroke":{"type":"circle","radius":"10%"}})");
+  const Experiment circle = good(
+      R"({"surfaces":[{"mesh":{"generator":"box","size":[0.1,0.2,0.3]}}],"stroke":{"type":"circle","radius":"10%"}})");
   EXPECT_NEAR(circle.stroke.radius, 0.03, 1e-15);
   EXPECT_TRUE(circle.path.closed());
   // Strokes lie on the surface, normals outward.
@@ -166,14 +178,18 @@ TEST_F(ExperimentScene, StrokesTakeSharesOfTheBounds) {
 
 TEST_F(ExperimentScene, ARecordedPathIsFollowed) {
   write("path.csv", "time [s],x [mm],y [mm],z [mm]\n0,0,45,0\n0.5,1,39.5,0\n1,2,39.5,0\n");
-  const Experiment e = good(R"({"surfaces":[{"mesh":{"generator":"icosphere"}}],"stroke":{"type":"recorded","path":"path.csv"}})");
+  const Experiment e =
+      good(R"({"surfaces":[{"mesh":{"generator":"icosphere"}}],"stroke":{"type":"recorded","path":"path.csv"}})");
   EXPECT_TRUE(e.path.recorded());
   EXPECT_NEAR(e.path.duration().count(), 1.0, 1e-12);
 }
 
 TEST_F(ExperimentScene, LawsTakeNamesOrObjects) {
   const auto law = [&](const std::string& text) {
-    return good(R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"},"height":"1mm"},"law":)" + text + "}]}").scene.instances()[0].law;
+    return good(R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"},"height":"1mm"},"law":)" +
+                text + "}]}")
+        .scene.instances()[0]
+        .law;
   };
   EXPECT_EQ(law_name(law("\"height-field-literal\"")), "height-field-literal");
   const Law meso = law(R"({"type":"mesostructure","formulation":"literal","rho":0.1,"blend":"linear"})");
@@ -197,7 +213,8 @@ TEST_F(ExperimentScene, WithLawChangesEverySurface) {
   EXPECT_EQ(law_name(changed->scene.instances()[0].law), "height-field");
   EXPECT_EQ(short_run(good(changed->canonical_json), 1500), short_run(*changed, 1500));
   EXPECT_NE(short_run(e, 1500), short_run(*changed, 1500));
-  const Result<Experiment> bare = with_law(good(R"({"surfaces":[{"mesh":{"generator":"box"}}]})"), *law_by_name("mesostructure"));
+  const Result<Experiment> bare =
+      with_law(good(R"({"surfaces":[{"mesh":{"generator":"box"}}]})"), *law_by_name("mesostructure"));
   ASSERT_FALSE(bare.ok());
   EXPECT_EQ(bare.error().code, ErrorCode::unsupported_pair);
   EXPECT_EQ(bare.error().place, "surfaces[0].law");
@@ -274,8 +291,9 @@ TEST_F(ExperimentScene, RealMapsAndMeshes) {
   EXPECT_EQ(coat_of(spot).settings().mapping, Mapping::uv);
   EXPECT_EQ(coat_of(spot).maps().heights().channel().channel, Channel::alpha);
   EXPECT_TRUE(has_note(spot, "alpha"));
-  const Experiment matrix = good(R"({"surfaces":[{"mesh":{"generator":"plane","width":"80mm","depth":"80mm"},"coat":{"mapping":"triplanar","height_map":")" +
-                                 file("topography/matrix-2_height16.png") + R"(","magnify":300}}]})");
+  const Experiment matrix = good(
+      R"({"surfaces":[{"mesh":{"generator":"plane","width":"80mm","depth":"80mm"},"coat":{"mapping":"triplanar","height_map":")" +
+      file("topography/matrix-2_height16.png") + R"(","magnify":300}}]})");
   EXPECT_TRUE(has_note(matrix, "matrix-2_height16.json"));
   EXPECT_NEAR(coat_of(matrix).maps().tile().x(), 650 * 3.69862e-07 * 300, 1e-9);
   EXPECT_LT(coat_of(matrix).lowest(), -0.9 * 300 * 2.1127745607575333e-06);

@@ -87,14 +87,14 @@ TEST(DirectionMetrics, TiltedForceIsOffByItsTilt) {
 TEST(HeightMetrics, H_II_ConsistentHeightFieldFollowsGentleReliefAndGodObjectDoesNot) {
   const MesostructureSpec spec{MesostructureKind::rings, 256, 1e-3, 8, 1};
   const StrokePath path = line_path();
-  const Scene relief = relief_scene(spec, HeightFieldLaw{}, Reconstruction::bicubic);
+  const Scene relief = relief_scene(spec, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
   const RunMetrics followed = measure_run(rendered_along(path, relief), relief, path);
   ASSERT_GT(followed.height.samples, 1000u);
   EXPECT_GT(followed.height.amplitude, 0.2e-3);
   EXPECT_LT(followed.height.relative_error, 0.01);
   EXPECT_LT(followed.direction.max, 1e-6);
 
-  const Scene base = relief_scene(spec, GodObjectLaw{}, Reconstruction::bicubic);
+  const Scene base = relief_scene(spec, GodObjectLaw{}, Reconstruction::quadratic_bspline);
   const RunMetrics flat = measure_run(rendered_along(path, base), base, path);
   EXPECT_LT(flat.height.excursion, 0.05 * flat.height.amplitude);
   EXPECT_GT(flat.height.relative_error, 0.2);

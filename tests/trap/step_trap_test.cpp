@@ -173,8 +173,8 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryLaw, StepTrap, ::testing::ValuesIn(law_names()), [](const auto& info) {
-  std::string name = info.param;
+INSTANTIATE_TEST_SUITE_P(EveryLaw, StepTrap, ::testing::ValuesIn(law_names()), [](const auto& parameter) {
+  std::string name = parameter.param;
   for (char& c : name) c = c == '-' ? '_' : c;
   return name;
 });

@@ -1,0 +1,61 @@
+// The modules' order, and the one place that each outside library has.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "tests/architecture/source_tree.h"
+
+namespace asperity::architecture {
+namespace {
+
+const std::vector<std::string> order = {"core",   "geometry", "field", "material", "surface",
+                                        "render", "device",   "servo", "io",       "study"};
+
+std::ptrdiff_t place_in_order(const std::string& module) {
+  return std::find(order.begin(), order.end(), module) - order.begin();
+}
+
+TEST(Layers, EveryModuleHasItsPlaceInTheOrder) {
+  for (const SourceFile& file : files_below("asperity/", {".h", ".cpp"})) {
+    EXPECT_LT(place_in_order(module_of(file.path)), static_cast<std::ptrdiff_t>(order.size())) << file.path;
+  }
+}
+
+TEST(Layers, ModulesIncludeOnlyModulesAboveThem) {
+  // render must work without any device, loop or file: what moves the probe comes from outside.
+  const std::vector<std::string> not_for_render = {"device", "servo", "io", "study"};
+  for (const SourceFile& file : files_below("asperity/", {".h", ".cpp"})) {
+    const std::string module = module_of(file.path);
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      const std::string name = included(file.lines[i]);
+      if (name.empty() || name.front() != '"') continue;
+      const std::string other = module_of(name.substr(1));
+      EXPECT_FALSE(other.empty()) << file.path << ":" << i + 1 << ": includes " << name << "; modules include \"asperity/MODULE/...\" only";
+      EXPECT_LE(place_in_order(other), place_in_order(module)) << file.path << ":" << i + 1 << ": " << module << " may not include " << name;
+      if (module == "render") {
+        EXPECT_EQ(std::count(not_for_render.begin(), not_for_render.end(), other), 0) << file.path << ":" << i + 1;
+      }
+    }
+  }
+}
+
+TEST(Layers, OutsideLibrariesStayInTheirPlaces) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> places = {
+      {"<Eigen/", {"core"}},           {"<nlohmann/", {"io", "study"}}, {"<png.h>", {"io"}}, {"<stb/", {"io"}},
+      {"<tiny_obj_loader.h>", {"io"}}, {"<kissfft/", {"study"}},        {"<CLI/", {}},       {"<embree3/", {}}};
+  for (const SourceFile& file : files_below("asperity/", {".h", ".cpp"})) {
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      const std::string name = included(file.lines[i]);
+      for (const auto& [start, modules] : places) {
+        if (name.compare(0, start.size(), start) != 0) continue;
+        EXPECT_NE(std::count(modules.begin(), modules.end(), module_of(file.path)), 0)
+            << file.path << ":" << i + 1 << ": " << name << " has its place elsewhere";
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace asperity::architecture

@@ -1,0 +1,48 @@
+#pragma once
+// Reports of real runs on small scenes, for the tests of their pages.
+
+#include "asperity/study/report.h"
+#include "tests/study/synthetic.h"
+
+namespace asperity::synthetic {
+
+inline ReportOrigin origin(const std::string& title) {
+  return {title, "asperity run sheet --seed 1", "a machine", "21 November 2026", "asperity 0.1.0", {"a warning"}, {"a note"}};
+}
+
+inline RunReport run_report(const std::string& title, bool with_picture = false) {
+  const StrokePath path = line_path();
+  const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
+  const auto records = rendered_along(path, scene);
+  RunReport report;
+  report.origin = origin(title);
+  report.law = "height-field";
+  report.setup = {{"Device", "omega.7"}, {"Stroke", "line"}};
+  report.series = derive_series(records, scene, path);
+  report.metrics = measure_run(records, report.series, path);
+  if (with_picture) {
+    PictureSettings settings;
+    settings.width = 240;
+    settings.height = 160;
+    report.picture = render_picture(scene, path, records, settings).value();
+  }
+  return report;
+}
+
+inline CompareReport compare_report(const std::string& title) {
+  const StrokePath path = line_path();
+  CompareReport report;
+  report.origin = origin(title);
+  for (const std::string& name : law_names()) {
+    const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, law_by_name(name).value(), Reconstruction::quadratic_bspline);
+    const auto records = rendered_along(path, scene);
+    CompareEntry entry;
+    entry.law = name;
+    entry.series = derive_series(records, scene, path);
+    entry.metrics = measure_run(records, entry.series, path);
+    report.entries.push_back(std::move(entry));
+  }
+  return report;
+}
+
+}  // namespace asperity::synthetic
