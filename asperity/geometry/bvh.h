@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -86,6 +88,7 @@ class Bvh {
   class Builder;
 
   void to_local(const Vec3& p, float local[3]) const noexcept;
+  static bool reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept;
   template <class Visit>
   void scan_leaf(std::uint32_t leaf, const float local[3], float limit, Visit& visit) const noexcept;
   /// Bound on the rounding of distances from `local`, in units of scale_.
@@ -108,6 +111,15 @@ inline void Bvh::to_local(const Vec3& p, float local[3]) const noexcept {
 inline float Bvh::rounding(const float local[3]) noexcept {
   const auto magnitude = [](float v) { return v < 0.0F ? -v : v; };
   return 2e-6F * (1.0F + magnitude(local[0]) + magnitude(local[1]) + magnitude(local[2]));
+}
+
+inline bool Bvh::reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept {
+  const Eigen::Vector3f offset(local[0] - cylinder.centre[0], local[1] - cylinder.centre[1], local[2] - cylinder.centre[2]);
+  const Eigen::Vector3f axis(cylinder.axis[0], cylinder.axis[1], cylinder.axis[2]);
+  const float along = offset.dot(axis);
+  const float beyond = std::max(0.0F, (offset - along * axis).norm() - cylinder.radius);
+  const float above = std::max(0.0F, std::abs(along) - cylinder.half_height);
+  return beyond * beyond + above * above <= limit * limit;
 }
 
 template <class Visit>
@@ -157,7 +169,7 @@ void Bvh::scan(const Vec3& p, double reach, Visit&& visit) const noexcept {
       const std::uint32_t child = node.child[__builtin_ctz(mask)];
       if ((child & leaf_bit) == 0) {
         stack[top++] = child;
-      } else {
+      } else if (reaches(cylinders_[child & ~leaf_bit], local, limit)) {
         scan_leaf(child & ~leaf_bit, local, limit, visit);
       }
     }

@@ -1,7 +1,7 @@
 // The published schema against the built-in scenes and against what the reader reads.
 
 #if defined(__GNUC__) && !defined(__clang__)
-// GCC 12 reports a false positive on string concatenation inside valijson at -O3 (GCC bug 105329).
+// GCC 12 reports a false positive inside valijson at -O3 (GCC bug 105329).
 #pragma GCC diagnostic ignored "-Wrestrict"
 #endif
 
