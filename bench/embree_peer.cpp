@@ -50,7 +50,6 @@ EmbreePeer::EmbreePeer(const TriangleMesh& mesh)
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_, geometry);
   rtcReleaseGeometry(geometry);
-  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(scene_);
   build_seconds_ = std::chrono::duration<double>(Clock::now() - start).count();
 }

@@ -6,8 +6,9 @@
 
 namespace asperity::bench {
 
-/// Embree's point query over the same mesh: the peer in the same run. Embree's own hierarchy is in single precision; the
-/// distance to each triangle is decided in double precision, as ours is, so both answer the same.
+/// Embree's point query over the same mesh: the peer in the same run. Embree's own hierarchy is in single precision;
+/// the distance to each triangle is decided in double precision, as ours is, so both answer the same. Built with one
+/// thread and Embree's default quality.
 class EmbreePeer {
  public:
   explicit EmbreePeer(const TriangleMesh& mesh);

@@ -64,7 +64,8 @@ std::vector<RowResult> measure(std::vector<Row>& rows, const Effort& effort, dou
   std::vector<RowResult> results;
   for (const Row& row : rows) {
     const double share = std::min(row.warm_samples().answered_share(), row.cold_samples().answered_share());
-    results.push_back({row.name(), row.warm_samples().summary(clock_cost), row.cold_samples().summary(clock_cost), share});
+    results.push_back(
+        {row.name(), row.warm_samples().summary(clock_cost), row.cold_samples().summary(clock_cost), share});
   }
   return results;
 }

@@ -51,20 +51,22 @@ class CacheSweep {
   std::vector<unsigned char> bytes_;
 };
 
-/// One way of answering, whose updates are timed one by one: update(tick) answers whether it touched or found something.
+/// One way of answering, whose updates are timed one by one: update(tick) answers whether it touched or found
+/// something.
 class Row {
  public:
   template <class Update>
   Row(std::string name, Update update)
       : name_(std::move(name)),
-        block_([update = std::move(update)](std::size_t begin, std::size_t end, CacheSweep* sweep, Samples& out) mutable {
-          for (std::size_t tick = begin; tick < end; ++tick) {
-            if (sweep != nullptr) sweep->run();
-            const Clock::time_point start = Clock::now();
-            const bool answered = update(tick);
-            out.add(Clock::now() - start, answered);
-          }
-        }) {}
+        block_(
+            [update = std::move(update)](std::size_t begin, std::size_t end, CacheSweep* sweep, Samples& out) mutable {
+              for (std::size_t tick = begin; tick < end; ++tick) {
+                if (sweep != nullptr) sweep->run();
+                const Clock::time_point start = Clock::now();
+                const bool answered = update(tick);
+                out.add(Clock::now() - start, answered);
+              }
+            }) {}
 
   void warm(std::size_t begin, std::size_t end) { block_(begin, end, nullptr, warm_); }
   void cold(std::size_t begin, std::size_t end, CacheSweep& sweep) { block_(begin, end, &sweep, cold_); }

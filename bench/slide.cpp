@@ -15,7 +15,7 @@ Slide make_slide(const TriangleIndex& index, std::size_t ticks) {
     const double travelled = advance * static_cast<double>(tick);
     slide.direction.push_back(place);
     const FirstHit hit = index.first_hit({2.0 * sphere_radius * place, Vec3::Zero()});
-    slide.surface.push_back(hit.hit() ? 2.0 * sphere_radius * (1.0 - hit.t) : sphere_radius);
+    slide.surface.push_back(hit.face != no_index ? 2.0 * sphere_radius * (1.0 - hit.t) : sphere_radius);
     // Curvature that swings slowly keeps the slide from closing into a circle.
     const double turn = advance * (0.9 * std::sin(0.37 * travelled) + 0.6 * std::sin(1.13 * travelled));
     const Vec3 ahead = std::cos(advance) * place + std::sin(advance) * heading;

@@ -68,8 +68,10 @@ Result<int> replay(const std::string& path, const Console& console) {
                  {},
                  "a trace written by asperity touch"};
   }
-  if (trace.records.empty())
-    return Error{ErrorCode::mismatch, "holds no ticks", path, {}, "a trace with at least one tick"};
+  if (trace.records.empty()) {
+    const std::string reason = trace.damage.empty() ? std::string() : ": " + trace.damage;
+    return Error{ErrorCode::mismatch, "holds no whole tick" + reason, path, {}, "a trace with at least one tick"};
+  }
   ASPERITY_TRY(const Experiment experiment, parse_experiment(trace.metadata.scene, ".", path + " (scene)", progress));
   ASPERITY_TRY(const Comparison comparison, play(trace, experiment, progress));
   const bool equal = comparison.different == 0;

@@ -26,8 +26,8 @@ window.addEventListener("error", (event) => {
     if (value === null || value === undefined || Number.isNaN(value)) return "\u2013";
     if (value === 0) return "0";
     const size = Math.abs(value);
-    // What is smaller is rounding; the file's JSON has the digits.
-    if (size < 1e-4) return value > 0 ? "< 0.0001" : "> \u22120.0001";
+    // Too small to matter in any unit of the page; its JSON has the digits.
+    if (size < 1e-4) return "\u2248\u00a00";
     if (size >= 1e5) return value.toExponential(Math.max(0, digits - 1));
     return size >= 10 ** digits ? value.toFixed(0) : String(Number(value.toPrecision(digits)));
   }

@@ -391,14 +391,21 @@ StrokeSettings default_stroke(const Box& bounds) {
   StrokeSettings settings;
   if (bounds.empty()) return settings;
   const Vec3 extent = bounds.extent();
-  const int along = extent.x() >= extent.z() ? 0 : 2;
-  Vec3 top = bounds.centre();
-  top.y() = bounds.upper.y();
-  settings.start = top;
-  settings.end = top;
-  settings.start[along] -= 0.3 * extent[along];
-  settings.end[along] += 0.3 * extent[along];
-  const double length = 0.6 * extent[along];
+  // The side that shows most of the object: across its shortest extent, the top where two are alike.
+  int across = 1;
+  for (const int axis : {0, 2}) {
+    if (extent[axis] < 0.99 * extent[across]) across = axis;
+  }
+  const int first = (across + 1) % 3;
+  const int second = (across + 2) % 3;
+  const int along = extent[std::min(first, second)] >= extent[std::max(first, second)] ? std::min(first, second) : std::max(first, second);
+  Vec3 middle = bounds.centre();
+  middle[across] = bounds.upper[across];
+  settings.start = middle;
+  settings.end = middle;
+  settings.start[along] -= 0.2 * extent[along];
+  settings.end[along] += 0.2 * extent[along];
+  const double length = 0.4 * extent[along];
   const double diagonal = bounds.diagonal();
   if (length > 0.0) settings.speed = length / 4.0;
   if (diagonal > 0.0) {

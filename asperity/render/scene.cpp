@@ -22,6 +22,9 @@ bool needs_coat(const Law& law) {
 
 Status check(const Instance& instance, std::size_t index, double probe_radius) {
   const std::string place = fmt::format("surfaces[{}]", index);
+  if (std::visit([](const auto& surface) { return surface == nullptr; }, instance.surface)) {
+    return Error{ErrorCode::bad_value, "holds no surface", {}, place + ".surface", "a mesh or relief surface"};
+  }
   const bool bare = std::holds_alternative<std::shared_ptr<const MeshSurface>>(instance.surface);
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");

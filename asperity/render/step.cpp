@@ -35,7 +35,9 @@ bool overlap(const Box& a, const Box& b) noexcept {
 bool update_slots(const Scene& scene, ProxyState& state, const Box& reach) noexcept {
   for (std::size_t i = state.contacts.size(); i-- > 0;) {
     const std::uint32_t instance = state.contacts[i].instance;
-    if (instance >= scene.instances().size() || !overlap(scene.world_bounds(instance), reach)) state.contacts.swap_remove(i);
+    // Under a thin sheet a pressed probe is far outside the sheet's own bounds, and still in contact.
+    if (instance < scene.instances().size() && (state.contacts[i].touching || overlap(scene.world_bounds(instance), reach))) continue;
+    state.contacts.swap_remove(i);
   }
   bool all = true;
   for (std::uint32_t instance = 0; instance < scene.instances().size(); ++instance) {
@@ -108,6 +110,7 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
       continue;
     }
     const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, slot);
+    slot.touching = law.contact;
     tick.add(slot.instance, law);
     if (law.contact) shadow = law.point;
   }

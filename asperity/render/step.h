@@ -14,6 +14,7 @@ struct ContactState {
   /// Force laws without a proxy: the probe has been seen outside, so that being inside now means having come in from
   /// the front. False at the start and after leaving over a rim.
   bool seen_outside = false;
+  bool touching = false;  ///< force laws without a proxy: pushed at the last tick
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per probe.

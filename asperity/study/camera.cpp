@@ -25,7 +25,8 @@ Fit fit(const Camera& camera, std::span<const Vec3> points, const Vec3& target) 
   for (const Vec3& point : points) {
     const Vec3 p = point - target;
     const double near = -p.dot(camera.forward);
-    const double across = std::max(std::abs(p.dot(camera.right)) / half_width, std::abs(p.dot(camera.up)) / half_height);
+    const double across =
+        std::max(std::abs(p.dot(camera.right)) / half_width, std::abs(p.dot(camera.up)) / half_height);
     out.distance = std::max(out.distance, near + margin * across);
   }
   double low[2] = {infinity, infinity};
@@ -50,7 +51,8 @@ Camera three_quarter_view(std::span<const Vec3> points, const Vec3& normal, int 
   const Vec3 hint = std::abs(normal.z()) > 0.8 ? Vec3(-Vec3::UnitY()) : Vec3::UnitZ();
   const Vec3 front = (hint - hint.dot(normal) * normal).normalized();
   const Vec3 side = normal.cross(front);
-  const Vec3 towards_eye = std::sin(elevation) * normal + std::cos(elevation) * (std::cos(azimuth) * front + std::sin(azimuth) * side);
+  const Vec3 towards_eye =
+      std::sin(elevation) * normal + std::cos(elevation) * (std::cos(azimuth) * front + std::sin(azimuth) * side);
   Camera camera;
   camera.forward = -towards_eye;
   camera.right = camera.forward.cross(normal).normalized();

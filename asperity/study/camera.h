@@ -12,12 +12,12 @@ namespace asperity {
 /// A pinhole camera. World frame (m); pixels count from the upper left, centres at halves.
 struct Camera {
   Vec3 eye = Vec3::Zero();
-  Vec3 right = Vec3::UnitX();    ///< unit
-  Vec3 up = Vec3::UnitY();       ///< unit
-  Vec3 forward = -Vec3::UnitZ(); ///< unit
-  double pixel = 1.0;            ///< size of a pixel at distance 1
-  double width = 1.0;            ///< pixels
-  double height = 1.0;           ///< pixels
+  Vec3 right = Vec3::UnitX();     ///< unit
+  Vec3 up = Vec3::UnitY();        ///< unit
+  Vec3 forward = -Vec3::UnitZ();  ///< unit
+  double pixel = 1.0;             ///< size of a pixel at distance 1
+  double width = 1.0;             ///< pixels
+  double height = 1.0;            ///< pixels
 
   /// Direction through a place of the image; its component along `forward` is 1.
   [[nodiscard]] Vec3 ray(double x, double y) const {

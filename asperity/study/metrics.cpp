@@ -12,7 +12,9 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double bins_per_decade = 10.0;
 constexpr double fastest_bin = 1e-8;  // s; the histogram's first edge at the lowest
 
-bool in_contact(const TraceRecord& tick) { return tick.rendered.flags.has(TickFlag::contact); }
+bool in_contact(const TraceRecord& tick) {
+  return tick.rendered.flags.has(TickFlag::contact);
+}
 
 TickMetrics measure_ticks(std::span<const TraceRecord> records, const RunSeries& series) {
   TickMetrics m;
@@ -141,7 +143,9 @@ UpdateMetrics measure_update(const RunSeries& series) {
   m.p99 = percentile(times, 0.99);
   m.p999 = percentile(times, 0.999);
   m.max = percentile(times, 1.0);
-  const auto bin = [](double t) { return static_cast<int>(std::floor(bins_per_decade * std::log10(std::max(t, fastest_bin)))); };
+  const auto bin = [](double t) {
+    return static_cast<int>(std::floor(bins_per_decade * std::log10(std::max(t, fastest_bin))));
+  };
   const int first = bin(*std::min_element(times.begin(), times.end()));
   const int last = bin(m.max);
   for (int k = first; k <= last + 1; ++k) m.edges.push_back(std::pow(10.0, k / bins_per_decade));
@@ -150,19 +154,29 @@ UpdateMetrics measure_update(const RunSeries& series) {
   return m;
 }
 
-/// Value of `y` where `x`, ascending apart from lag, first reaches `at`; not-a-number when it never does.
-double value_at(std::span<const double> x, std::span<const double> y, double at) {
-  double x0 = nan;
-  double y0 = nan;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (!std::isfinite(x[i])) continue;
-    // A path's last tick may fall short of the whole length by rounding.
-    if (x[i] >= at - 1e-9 * std::abs(at)) return std::isfinite(x0) && x[i] > x0 ? y0 + (y[i] - y0) * (at - x0) / (x[i] - x0) : y[i];
-    x0 = x[i];
-    y0 = y[i];
+/// A column over distance: the ticks at which the probe advances.
+class OverDistance {
+ public:
+  OverDistance(std::span<const double> distance, std::span<const double> values) {
+    for (std::size_t i = 0; i < distance.size(); ++i) {
+      if (!std::isfinite(distance[i]) || (!x_.empty() && distance[i] <= x_.back())) continue;
+      x_.push_back(distance[i]);
+      y_.push_back(values[i]);
+    }
   }
-  return nan;
-}
+  /// Straight between ticks. The stroke's ends lie between ticks as well: lines go on for one tick and a half beyond.
+  [[nodiscard]] double at(double distance) const {
+    if (x_.size() < 2) return nan;
+    const auto above = std::upper_bound(x_.begin() + 1, x_.end() - 1, distance);
+    const auto i = static_cast<std::size_t>(above - x_.begin());
+    const double u = (distance - x_[i - 1]) / (x_[i] - x_[i - 1]);
+    return u >= -1.5 && u <= 2.5 ? y_[i - 1] + u * (y_[i] - y_[i - 1]) : nan;
+  }
+
+ private:
+  std::vector<double> x_;
+  std::vector<double> y_;
+};
 
 /// Length of one loop of a stroke that comes back to where it was (m); 0 for one that does not.
 double loop_length(const StrokePath& path, double travelled) {
@@ -172,7 +186,8 @@ double loop_length(const StrokePath& path, double travelled) {
   return travelled > 1.5 * path.length() ? 2.0 * path.length() : 0.0;
 }
 
-EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path, double travelled) {
+EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path,
+                             double travelled) {
   EnergyMetrics m;
   m.mean_loop = nan;
   if (records.empty()) return m;
@@ -184,23 +199,27 @@ EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeri
     m.generated = std::max(m.generated, total[i] - lowest);
     m.absorbed = std::max(m.absorbed, -series.work[i]);
     if (i == 0) continue;
-    const double held = records[i - 1].commanded.dot(records[i].probe.pose.position - records[i - 1].probe.pose.position);
+    const double held =
+        records[i - 1].commanded.dot(records[i].probe.pose.position - records[i - 1].probe.pose.position);
     if (std::isfinite(held)) m.held_work += held;
   }
   m.work = series.work.back();
   const double loop = loop_length(path, travelled);
   if (loop <= 0.0) return m;
-  for (double end = loop; end <= travelled * (1.0 + 1e-9); end += loop) {
-    const double energy = value_at(series.distance, total, end) - value_at(series.distance, total, end - loop);
-    if (std::isfinite(energy)) m.loops.push_back(energy);
+  const OverDistance energy(series.distance, total);
+  for (double begin = 0.0; begin < travelled; begin += loop) {
+    const double gained = energy.at(begin + loop) - energy.at(begin);
+    if (std::isfinite(gained)) m.loops.push_back(gained);
   }
   if (m.loops.empty()) return m;
   m.mean_loop = 0.0;
-  for (const double energy : m.loops) m.mean_loop += energy / static_cast<double>(m.loops.size());
+  for (const double gained : m.loops) m.mean_loop += gained / static_cast<double>(m.loops.size());
   return m;
 }
 
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+nlohmann::json number(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
 
 nlohmann::json peaks_json(const Spectrum& spectrum) {
   return {{"peak_frequency", number(spectrum.peak_frequency)}, {"peak_density", number(spectrum.peak_density)}};
@@ -247,32 +266,54 @@ std::string metrics_json(const RunMetrics& m) {
   for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) flags[flag_name(bit)] = m.ticks.flags[bit];
   nlohmann::json loops = nlohmann::json::array();
   for (const double energy : m.energy.loops) loops.push_back(number(energy));
-  const nlohmann::json json = {
-      {"ticks",
-       {{"count", m.ticks.ticks}, {"contact", m.ticks.contact}, {"duration", m.ticks.duration}, {"rate", m.ticks.rate},
-        {"length", m.ticks.length}, {"flags", flags}, {"safety_interventions", m.ticks.safety_interventions},
-        {"largest_intervention", number(m.ticks.largest_intervention)}}},
-      {"force",
-       {{"mean", number(m.force.mean)}, {"max", number(m.force.max)}, {"rms", number(m.force.rms)},
-        {"mean_normal", number(m.force.mean_normal)}, {"largest_jump", number(m.force.largest_jump)},
-        {"jump_tick", m.force.jump_tick}, {"jump_distance", number(m.force.jump_distance)}}},
-      {"direction",
-       {{"samples", m.direction.samples}, {"mean", number(m.direction.mean)}, {"p99", number(m.direction.p99)},
-        {"max", number(m.direction.max)}}},
-      {"height",
-       {{"samples", m.height.samples}, {"excluded", m.height.excluded}, {"rms_error", number(m.height.rms_error)},
-        {"max_error", number(m.height.max_error)}, {"amplitude", number(m.height.amplitude)},
-        {"relative_error", number(m.height.relative_error)}, {"excursion", number(m.height.excursion)}}},
-      {"spectrum",
-       {{"normal_time", peaks_json(m.spectrum.normal_time)}, {"tangential_time", peaks_json(m.spectrum.tangential_time)},
-        {"normal_distance", peaks_json(m.spectrum.normal_distance)},
-        {"tangential_distance", peaks_json(m.spectrum.tangential_distance)}}},
-      {"update",
-       {{"mean", number(m.update.mean)}, {"p50", number(m.update.p50)}, {"p99", number(m.update.p99)},
-        {"p999", number(m.update.p999)}, {"max", number(m.update.max)}}},
-      {"energy",
-       {{"work", number(m.energy.work)}, {"held_work", number(m.energy.held_work)}, {"absorbed", number(m.energy.absorbed)},
-        {"generated", number(m.energy.generated)}, {"loops", loops}, {"mean_loop", number(m.energy.mean_loop)}}}};
+  const nlohmann::json json = {{"ticks",
+                                {{"count", m.ticks.ticks},
+                                 {"contact", m.ticks.contact},
+                                 {"duration", m.ticks.duration},
+                                 {"rate", m.ticks.rate},
+                                 {"length", m.ticks.length},
+                                 {"flags", flags},
+                                 {"safety_interventions", m.ticks.safety_interventions},
+                                 {"largest_intervention", number(m.ticks.largest_intervention)}}},
+                               {"force",
+                                {{"mean", number(m.force.mean)},
+                                 {"max", number(m.force.max)},
+                                 {"rms", number(m.force.rms)},
+                                 {"mean_normal", number(m.force.mean_normal)},
+                                 {"largest_jump", number(m.force.largest_jump)},
+                                 {"jump_tick", m.force.jump_tick},
+                                 {"jump_distance", number(m.force.jump_distance)}}},
+                               {"direction",
+                                {{"samples", m.direction.samples},
+                                 {"mean", number(m.direction.mean)},
+                                 {"p99", number(m.direction.p99)},
+                                 {"max", number(m.direction.max)}}},
+                               {"height",
+                                {{"samples", m.height.samples},
+                                 {"excluded", m.height.excluded},
+                                 {"rms_error", number(m.height.rms_error)},
+                                 {"max_error", number(m.height.max_error)},
+                                 {"amplitude", number(m.height.amplitude)},
+                                 {"relative_error", number(m.height.relative_error)},
+                                 {"excursion", number(m.height.excursion)}}},
+                               {"spectrum",
+                                {{"normal_time", peaks_json(m.spectrum.normal_time)},
+                                 {"tangential_time", peaks_json(m.spectrum.tangential_time)},
+                                 {"normal_distance", peaks_json(m.spectrum.normal_distance)},
+                                 {"tangential_distance", peaks_json(m.spectrum.tangential_distance)}}},
+                               {"update",
+                                {{"mean", number(m.update.mean)},
+                                 {"p50", number(m.update.p50)},
+                                 {"p99", number(m.update.p99)},
+                                 {"p999", number(m.update.p999)},
+                                 {"max", number(m.update.max)}}},
+                               {"energy",
+                                {{"work", number(m.energy.work)},
+                                 {"held_work", number(m.energy.held_work)},
+                                 {"absorbed", number(m.energy.absorbed)},
+                                 {"generated", number(m.energy.generated)},
+                                 {"loops", loops},
+                                 {"mean_loop", number(m.energy.mean_loop)}}}};
   return json.dump(2);
 }
 

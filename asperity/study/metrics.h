@@ -17,10 +17,10 @@ struct ForceMetrics {
   double mean = 0.0;
   double max = 0.0;
   double rms = 0.0;
-  double mean_normal = 0.0;         ///< along the stroke's normal
-  double largest_jump = 0.0;        ///< largest change of the force vector from one tick to the next, whole run
-  std::uint64_t jump_tick = 0;      ///< the tick it arrived at
-  double jump_distance = 0.0;       ///< travelled distance there (m); not-a-number off the surface
+  double mean_normal = 0.0;     ///< along the stroke's normal
+  double largest_jump = 0.0;    ///< largest change of the force vector from one tick to the next, whole run
+  std::uint64_t jump_tick = 0;  ///< the tick it arrived at
+  double jump_distance = 0.0;   ///< travelled distance there (m); not-a-number off the surface
 };
 
 /// Angle between rendered force and reference normal (rad), over the ticks of the contact phase.
@@ -33,13 +33,13 @@ struct DirectionMetrics {
 
 /// Followed height against the relief (m), over the ticks in contact of the contact phase.
 struct HeightMetrics {
-  std::size_t samples = 0;       ///< compared
-  std::size_t excluded = 0;      ///< left out, within one texel of a step
-  double rms_error = 0.0;        ///< of followed - relief
-  double max_error = 0.0;        ///< largest absolute difference
-  double amplitude = 0.0;        ///< highest - lowest relief met on the way
-  double relative_error = 0.0;   ///< rms_error / amplitude; not-a-number without relief
-  double excursion = 0.0;        ///< highest - lowest followed height
+  std::size_t samples = 0;      ///< compared
+  std::size_t excluded = 0;     ///< left out, within one texel of a step
+  double rms_error = 0.0;       ///< of followed - relief
+  double max_error = 0.0;       ///< largest absolute difference
+  double amplitude = 0.0;       ///< highest - lowest relief met on the way
+  double relative_error = 0.0;  ///< rms_error / amplitude; not-a-number without relief
+  double excursion = 0.0;       ///< highest - lowest followed height
 };
 
 /// Commanded force of the contact phase; over time in Hz, over distance in 1/m.
@@ -57,28 +57,28 @@ struct UpdateMetrics {
   double p99 = 0.0;
   double p999 = 0.0;
   double max = 0.0;
-  std::vector<double> edges;            ///< of the histogram's bins (s), ten a decade; one more than `counts`
+  std::vector<double> edges;  ///< of the histogram's bins (s), ten a decade; one more than `counts`
   std::vector<std::uint64_t> counts;
 };
 
 /// Work of the commanded force on the probe (J). Positive is energy fed into the hand.
 struct EnergyMetrics {
-  double work = 0.0;            ///< whole run, trapezoid
-  double held_work = 0.0;       ///< whole run, with the force held from tick to tick as a device holds it
-  double absorbed = 0.0;        ///< most that the contact held or dissipated at one time: -min(work)
-  double generated = 0.0;       ///< largest rise of work + stored energy from any earlier tick; 0 for a passive contact
-  std::vector<double> loops;    ///< work + change of stored energy of each full loop (closed, or there and back)
-  double mean_loop = 0.0;       ///< not-a-number without a full loop
+  double work = 0.0;          ///< whole run, trapezoid
+  double held_work = 0.0;     ///< whole run, with the force held from tick to tick as a device holds it
+  double absorbed = 0.0;      ///< most that the contact held or dissipated at one time: -min(work)
+  double generated = 0.0;     ///< largest rise of work + stored energy from any earlier tick; 0 for a passive contact
+  std::vector<double> loops;  ///< work + change of stored energy of each full loop (closed, or there and back)
+  double mean_loop = 0.0;     ///< not-a-number without a full loop
 };
 
 /// Ticks that had each flag, and what the safety stage changed.
 struct TickMetrics {
   std::uint64_t ticks = 0;
   std::uint64_t contact = 0;
-  double duration = 0.0;             ///< s
-  double rate = 0.0;                 ///< ticks a second (Hz)
-  double length = 0.0;               ///< distance travelled in the contact phase (m)
-  std::array<std::uint64_t, 8> flags{};  ///< by bit of TickFlag
+  double duration = 0.0;                   ///< s
+  double rate = 0.0;                       ///< ticks a second (Hz)
+  double length = 0.0;                     ///< distance travelled in the contact phase (m)
+  std::array<std::uint64_t, 8> flags{};    ///< by bit of TickFlag
   std::uint64_t safety_interventions = 0;  ///< ticks whose commanded force is not the rendered one
   double largest_intervention = 0.0;       ///< largest |rendered - commanded| (N)
 };

@@ -11,8 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-// A plot is about 1000 pixels wide: the extremes of somewhat more stretches lose nothing that could be seen. A page with
-// several laws has to share.
+// A plot is about 1000 pixels wide: the extremes of somewhat more stretches lose nothing that could be seen. A page
+// with several laws has to share.
 constexpr std::size_t run_stretches = 1500;
 constexpr std::size_t compare_stretches = 3000;
 constexpr std::size_t fewest_stretches = 250;
@@ -44,9 +44,10 @@ double step_of(const Column& column) {
   return largest > 0.0 ? std::pow(10.0, std::floor(std::log10(largest * resolution))) : 0.0;
 }
 
-/// Indices of the ticks that are kept: of each stretch the ticks where some column is lowest or highest, and one where it
-/// has no value, so that gaps stay open.
-std::vector<std::size_t> kept_ticks(const std::vector<std::size_t>& ticks, const std::vector<Column>& columns, std::size_t stretches) {
+/// Indices of the ticks that are kept: of each stretch the ticks where some column is lowest or highest, and one where
+/// it has no value, so that gaps stay open.
+std::vector<std::size_t> kept_ticks(const std::vector<std::size_t>& ticks, const std::vector<Column>& columns,
+                                    std::size_t stretches) {
   if (ticks.size() <= 4 * stretches) return ticks;
   std::vector<std::size_t> kept;
   for (std::size_t b = 0; b < stretches; ++b) {
@@ -76,7 +77,8 @@ std::vector<std::size_t> kept_ticks(const std::vector<std::size_t>& ticks, const
 }
 
 /// Rows [x, y ...] of a plot: of all ticks, or of those of the contact phase.
-json plot_rows(const RunSeries& series, const Column& x, const std::vector<Column>& columns, bool stroking_only, std::size_t stretches) {
+json plot_rows(const RunSeries& series, const Column& x, const std::vector<Column>& columns, bool stroking_only,
+               std::size_t stretches) {
   std::vector<std::size_t> ticks;
   for (std::size_t i = 0; i < series.size(); ++i) {
     const double at = (*x.values)[i];
@@ -92,7 +94,8 @@ json plot_rows(const RunSeries& series, const Column& x, const std::vector<Colum
   json rows = json::array();
   for (const std::size_t i : kept) {
     json row = json::array({rounded((*x.values)[i] * x.scale, x_step)});
-    for (std::size_t k = 0; k < columns.size(); ++k) row.push_back(rounded((*columns[k].values)[i] * columns[k].scale, steps[k]));
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      row.push_back(rounded((*columns[k].values)[i] * columns[k].scale, steps[k]));
     rows.push_back(std::move(row));
   }
   return {{"labels", labels}, {"rows", rows}, {"ticks", ticks.size()}, {"shown", kept.size()}};
@@ -107,7 +110,8 @@ json significant(double value) {
 json spectrum_rows(const char* unit, const Spectrum& normal, const Spectrum& tangential) {
   json rows = json::array();
   for (std::size_t i = 0; i < std::min(normal.frequency.size(), tangential.frequency.size()); ++i) {
-    rows.push_back({significant(normal.frequency[i]), significant(std::sqrt(normal.density[i])), significant(std::sqrt(tangential.density[i]))});
+    rows.push_back({significant(normal.frequency[i]), significant(std::sqrt(normal.density[i])),
+                    significant(std::sqrt(tangential.density[i]))});
   }
   return {{"labels", {unit, "normal", "tangential"}}, {"rows", rows}};
 }
@@ -179,8 +183,9 @@ json numbers(const RunMetrics& m) {
 json origin_data(const ReportOrigin& origin, const std::vector<ReportFact>& setup) {
   json facts = json::array();
   for (const ReportFact& fact : setup) facts.push_back({fact.name, fact.value});
-  return {{"title", origin.title},     {"command", origin.command},   {"machine", origin.machine}, {"date", origin.date},
-          {"program", origin.program}, {"warnings", origin.warnings}, {"notes", origin.notes},     {"setup", facts}};
+  return {
+      {"title", origin.title},     {"command", origin.command},   {"machine", origin.machine}, {"date", origin.date},
+      {"program", origin.program}, {"warnings", origin.warnings}, {"notes", origin.notes},     {"setup", facts}};
 }
 
 /// What the page needs to say about a picture; its pixels are in the page itself.
@@ -191,7 +196,9 @@ json picture_data(const std::optional<Picture>& picture) {
     const auto c = force_colour(i / 16.0);
     colours.push_back(fmt::format("rgb({},{},{})", c[0], c[1], c[2]));
   }
-  return {{"low_n", significant(picture->force_low)}, {"high_n", significant(picture->force_high)}, {"colours", colours},
+  return {{"low_n", significant(picture->force_low)},
+          {"high_n", significant(picture->force_high)},
+          {"colours", colours},
           {"caption", picture->caption}};
 }
 
@@ -201,7 +208,8 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
   const Column time{"time", &s.time, 1.0};
   std::vector<double> total(s.size());
   for (std::size_t i = 0; i < s.size(); ++i) total[i] = s.work[i] + s.stored[i];
-  const std::vector<Column> force{{"normal", &s.normal, 1.0}, {"tangential", &s.tangential, 1.0}, {"magnitude", &s.force, 1.0}};
+  const std::vector<Column> force{
+      {"normal", &s.normal, 1.0}, {"tangential", &s.tangential, 1.0}, {"magnitude", &s.force, 1.0}};
   const std::vector<Column> heights{{"followed", &s.followed, milli}, {"relief", &s.relief, milli}};
   const std::vector<Column> energy{{"work", &s.work, milli}, {"stored", &s.stored, milli}, {"sum", &total, milli}};
   return {{"law", law},
@@ -211,17 +219,18 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
           {"height_distance", plot_rows(s, distance, heights, true, stretches)},
           {"direction_distance", plot_rows(s, distance, {{"angle", &s.direction_error, degrees}}, true, stretches)},
           {"energy_time", plot_rows(s, time, energy, false, stretches)},
-          {"spectrum_distance", spectrum_rows("frequency", per_millimetre(m.spectrum.normal_distance), per_millimetre(m.spectrum.tangential_distance))}};
+          {"spectrum_distance", spectrum_rows("frequency", per_millimetre(m.spectrum.normal_distance),
+                                              per_millimetre(m.spectrum.tangential_distance))}};
 }
 
 }  // namespace
 
 Status check_series(const RunSeries& series, const std::string& place) {
   const std::size_t n = series.time.size();
-  const bool equal = series.distance.size() == n && series.force.size() == n && series.normal.size() == n && series.tangential.size() == n &&
-                     series.followed.size() == n && series.relief.size() == n && series.direction_error.size() == n &&
-                     series.work.size() == n && series.stored.size() == n && series.update.size() == n && series.near_step.size() == n &&
-                     series.stroking.size() == n;
+  const bool equal = series.distance.size() == n && series.force.size() == n && series.normal.size() == n &&
+                     series.tangential.size() == n && series.followed.size() == n && series.relief.size() == n &&
+                     series.direction_error.size() == n && series.work.size() == n && series.stored.size() == n &&
+                     series.update.size() == n && series.near_step.size() == n && series.stroking.size() == n;
   if (equal) return success();
   return Error{ErrorCode::bad_value, "has columns of different lengths", "", place, "columns with one value a tick"};
 }
@@ -233,9 +242,12 @@ json run_data(const RunReport& report) {
   data["picture"] = picture_data(report.picture);
   const RunSeries& s = report.series;
   json law = law_data(report.law, s, report.metrics, run_stretches);
-  law["force_time"] = plot_rows(s, {"time", &s.time, 1.0}, {{"normal", &s.normal, 1.0}, {"tangential", &s.tangential, 1.0}, {"magnitude", &s.force, 1.0}},
-                                false, run_stretches);
-  law["spectrum_time"] = spectrum_rows("frequency", report.metrics.spectrum.normal_time, report.metrics.spectrum.tangential_time);
+  law["force_time"] =
+      plot_rows(s, {"time", &s.time, 1.0},
+                {{"normal", &s.normal, 1.0}, {"tangential", &s.tangential, 1.0}, {"magnitude", &s.force, 1.0}}, false,
+                run_stretches);
+  law["spectrum_time"] =
+      spectrum_rows("frequency", report.metrics.spectrum.normal_time, report.metrics.spectrum.tangential_time);
   law["update_histogram"] = histogram(report.metrics.update);
   data["laws"] = json::array({std::move(law)});
   return data;
@@ -244,12 +256,15 @@ json run_data(const RunReport& report) {
 json compare_data(const CompareReport& report) {
   json data = origin_data(report.origin, report.setup);
   data["kind"] = "compare";
-  data["summary"] = fmt::format("{} laws on the same scene and stroke. Direction and height errors are against the reconstructed relief; "
-                                "a law that does not render relief shows it here.", report.entries.size());
+  data["summary"] = fmt::format(
+      "{} laws on the same scene and stroke. Direction and height errors are against the reconstructed relief; "
+      "a law that does not render relief shows it here.",
+      report.entries.size());
   data["picture"] = picture_data(report.picture);
   data["laws"] = json::array();
   const std::size_t stretches = std::max(fewest_stretches, compare_stretches / report.entries.size());
-  for (const CompareEntry& entry : report.entries) data["laws"].push_back(law_data(entry.law, entry.series, entry.metrics, stretches));
+  for (const CompareEntry& entry : report.entries)
+    data["laws"].push_back(law_data(entry.law, entry.series, entry.metrics, stretches));
   return data;
 }
 

@@ -23,9 +23,10 @@ constexpr double surroundings = 0.75;  // of the stroke's size, on every side
 // The pass that measures the cost casts a ray each so many pixels.
 constexpr int sparse = 8;
 constexpr int largest_block = 3;
-constexpr double smallest_size = 0.5;
-constexpr double uneven_cost = 2.4;  // of a ray where the surface is uneven, relative to the mean one
-constexpr double edge_share = 0.2;   // of the budget that smooth edges may always have
+constexpr double smallest_size = 0.67;
+constexpr double uneven_cost = 2.4;     // of a ray where the surface is uneven, relative to the mean one
+constexpr double edge_share = 0.2;      // of the budget that smooth edges may always have
+constexpr double outline_share = 0.03;  // of the pixels, which an outline takes: it is smooth in every picture
 
 Vec3 average_normal(const StrokePath& path) {
   Vec3 sum = Vec3::Zero();
@@ -36,7 +37,8 @@ Vec3 average_normal(const StrokePath& path) {
 
 void add_corners(const Box& box, std::vector<Vec3>& points) {
   for (int k = 0; k < 8; ++k) {
-    points.emplace_back((k & 1 ? box.upper : box.lower).x(), (k & 2 ? box.upper : box.lower).y(), (k & 4 ? box.upper : box.lower).z());
+    points.emplace_back((k & 1 ? box.upper : box.lower).x(), (k & 2 ? box.upper : box.lower).y(),
+                        (k & 4 ? box.upper : box.lower).z());
   }
 }
 
@@ -54,7 +56,8 @@ std::vector<Vec3> framing_points(const Scene& scene, const StrokePath& path) {
   for (const Instance& instance : scene.instances()) {
     const auto positions = base_mesh(instance.surface).positions();
     const std::size_t stride = positions.size() / most_framing_points + 1;
-    for (std::size_t i = 0; i < positions.size(); i += stride) points.push_back(instance.world_from_object.apply(positions[i]));
+    for (std::size_t i = 0; i < positions.size(); i += stride)
+      points.push_back(instance.world_from_object.apply(positions[i]));
   }
   for (const Vec3& point : path.points()) points.push_back(point);
   return points;
@@ -62,9 +65,9 @@ std::vector<Vec3> framing_points(const Scene& scene, const StrokePath& path) {
 
 /// How a picture is drawn so that it stays within its budget of time.
 struct Detail {
-  int block = 1;             // pixels between the rays of smooth parts
-  double size = 1.0;         // of the picture, relative to what was asked
-  std::size_t edges = 0;     // pixels that may be cast again
+  int block = 1;          // pixels between the rays of smooth parts
+  double size = 1.0;      // of the picture, relative to what was asked
+  std::size_t edges = 0;  // pixels that may be cast again
 };
 
 /// Seconds for a picture of `pixels` with `block`. Uneven cells lie along lines: their share grows with the block.
@@ -84,7 +87,8 @@ Detail choose_detail(const CastCost& cost, double pixels, double budget) {
   if (seconds > budget) detail.size = std::max(smallest_size, std::sqrt(budget / seconds));
   const double drawn = pixels * detail.size * detail.size;
   const double left = std::max(edge_share * budget, budget - seconds);
-  detail.edges = static_cast<std::size_t>(std::min(drawn, left / (4.0 * uneven_cost * std::max(cost.seconds_per_ray, 1e-12))));
+  const double affordable = std::min(drawn, left / (4.0 * uneven_cost * std::max(cost.seconds_per_ray, 1e-12)));
+  detail.edges = static_cast<std::size_t>(std::max(outline_share * drawn, affordable));
   return detail;
 }
 
@@ -114,7 +118,8 @@ Image to_image(const std::vector<Colour>& colours, int width, int height) {
   image.channels = 3;
   image.samples.reserve(3 * colours.size());
   for (const Colour& colour : colours) {
-    for (const float value : colour) image.samples.push_back(static_cast<std::uint16_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F))));
+    for (const float value : colour)
+      image.samples.push_back(static_cast<std::uint16_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F))));
   }
   return image;
 }
@@ -123,8 +128,10 @@ std::string caption(const Camera& camera, const std::vector<Vec3>& framing, int 
   Box box;
   for (const Vec3& point : framing) box.include(point);
   const double across = camera.width * camera.pixel * (box.centre() - camera.eye).dot(camera.forward);
-  std::string text = fmt::format("View {:.3g} mm wide, cast through the same surface queries that are felt.", 1e3 * across);
-  if (block > 1) text += fmt::format(" Smooth parts are interpolated between rays {} pixels apart to save time.", block);
+  std::string text =
+      fmt::format("View {:.3g} mm wide, cast through the same surface queries that are felt.", 1e3 * across);
+  if (block > 1)
+    text += fmt::format(" Smooth parts are interpolated between rays {} pixels apart to save time.", block);
   return text;
 }
 
@@ -171,7 +178,8 @@ std::array<std::uint8_t, 3> force_colour(double fraction) {
   const std::size_t i = std::min(stops.size() - 2, static_cast<std::size_t>(at));
   const double u = at - static_cast<double>(i);
   std::array<std::uint8_t, 3> colour{};
-  for (std::size_t k = 0; k < 3; ++k) colour[k] = static_cast<std::uint8_t>(std::lround((1.0 - u) * stops[i][k] + u * stops[i + 1][k]));
+  for (std::size_t k = 0; k < 3; ++k)
+    colour[k] = static_cast<std::uint8_t>(std::lround((1.0 - u) * stops[i][k] + u * stops[i + 1][k]));
   return colour;
 }
 

@@ -42,7 +42,8 @@ Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
 }
 
 /// First hit of a mesh, by the ray's parameter.
-Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
+Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
   const Segment motion{origin + part.from * direction, origin + part.to * direction};
   const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
   if (!hit.hit) return {};
@@ -63,8 +64,10 @@ bool beyond_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
   return false;
 }
 
-/// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is wide.
-Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
+/// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is
+/// wide.
+Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
   const bool open = !surface.base().mesh().report().closed();
   const double after = surface.skin() / direction.norm();
   for (int i = 0; i < most_rim_hits && part.from < part.to; ++i) {
@@ -104,7 +107,8 @@ std::vector<int> places(int size, int block) {
   return out;
 }
 
-/// Pixels x0 ... x1 by y0 ... y1, with what the rays at its corners saw: upper left, upper right, lower left, lower right.
+/// Pixels x0 ... x1 by y0 ... y1, with what the rays at its corners saw: upper left, upper right, lower left, lower
+/// right.
 struct Cell {
   int x0, x1, y0, y1;
   const Pixel* corners[4];
@@ -118,7 +122,8 @@ bool smooth(const Cell& cell, const Camera& camera) {
     if (first.hit() && corner->normal.dot(first.normal) < smooth_cosine) return false;
   }
   if (!first.hit()) return true;
-  const double twist = cell.corners[0]->depth + cell.corners[3]->depth - cell.corners[1]->depth - cell.corners[2]->depth;
+  const double twist =
+      cell.corners[0]->depth + cell.corners[3]->depth - cell.corners[1]->depth - cell.corners[2]->depth;
   return std::abs(twist) < camera.pixel * first.depth;
 }
 
@@ -130,8 +135,12 @@ struct Lattice {
   [[nodiscard]] Cell cell(int column, int row) const {
     const auto c = static_cast<std::size_t>(column);
     const auto r = static_cast<std::size_t>(row);
-    return {xs[c], xs[c + 1], ys[r], ys[r + 1],
-            {&knots.at(column, row), &knots.at(column + 1, row), &knots.at(column, row + 1), &knots.at(column + 1, row + 1)}};
+    return {xs[c],
+            xs[c + 1],
+            ys[r],
+            ys[r + 1],
+            {&knots.at(column, row), &knots.at(column + 1, row), &knots.at(column, row + 1),
+             &knots.at(column + 1, row + 1)}};
   }
 };
 
@@ -210,7 +219,8 @@ Pixel RayCaster::cast(double x, double y) {
     Interval part = clip(from, along, bounds.grown(1e-3 * bounds.diagonal()));
     part.to = std::min(part.to, nearest.depth);
     if (part.from >= part.to) continue;
-    const Pixel seen = std::visit([&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, hints_[i]); }, instance.surface);
+    const Pixel seen = std::visit(
+        [&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, hints_[i]); }, instance.surface);
     if (!seen.hit() || seen.depth >= nearest.depth) continue;
     nearest.depth = seen.depth;
     nearest.normal = instance.world_from_object.rotate(seen.normal);
@@ -230,7 +240,8 @@ PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, int th
   const int cell_rows = lattice.knots.rows - 1;
   for_each_row(cell_rows, threads, [&] {
     return [&, caster = RayCaster(scene, camera)](int row, bool first) mutable {
-      for (int column = 0; column + 1 < lattice.knots.columns; ++column) fill_cell(lattice.cell(column, row), camera, caster, grid);
+      for (int column = 0; column + 1 < lattice.knots.columns; ++column)
+        fill_cell(lattice.cell(column, row), camera, caster, grid);
       if (first && progress) progress("drawing the picture", share + (1.0 - share) * (row + 1) / cell_rows);
     };
   });
@@ -251,7 +262,8 @@ CastCost measure_cost(const Scene& scene, const Camera& camera, int block, int t
   return {seconds / static_cast<double>(lattice.knots.pixels.size()), uneven / std::max(1.0, cells)};
 }
 
-std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most, int threads) {
+std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most,
+                                  int threads) {
   std::vector<std::pair<double, std::size_t>> candidates;
   for (int y = 0; y < grid.rows; ++y) {
     for (int x = 0; x < grid.columns; ++x) {
@@ -275,7 +287,8 @@ std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, cons
         const auto columns = static_cast<std::size_t>(grid.columns);
         const auto x = static_cast<double>(edges[i].index % columns);
         const auto y = static_cast<double>(edges[i].index / columns);
-        for (int k = 0; k < 4; ++k) edges[i].quarters[k] = caster.cast(x + (k % 2 ? 0.75 : 0.25), y + (k / 2 ? 0.75 : 0.25));
+        for (int k = 0; k < 4; ++k)
+          edges[i].quarters[k] = caster.cast(x + (k % 2 ? 0.75 : 0.25), y + (k / 2 ? 0.75 : 0.25));
       }
     };
   });

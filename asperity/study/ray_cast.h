@@ -13,8 +13,8 @@ namespace asperity {
 
 /// What one ray saw.
 struct Pixel {
-  double depth = infinity;       ///< along the camera's forward axis (m); infinity: nothing
-  Vec3 normal = Vec3::Zero();    ///< unit, towards the eye
+  double depth = infinity;     ///< along the camera's forward axis (m); infinity: nothing
+  Vec3 normal = Vec3::Zero();  ///< unit, towards the eye
   [[nodiscard]] bool hit() const { return depth < infinity; }
 };
 
@@ -43,8 +43,8 @@ struct PixelGrid {
   [[nodiscard]] const Pixel& at(int x, int y) const { return pixels[index(x, y)]; }
 };
 
-/// Casts the camera's image with `threads` threads. A ray each `block` pixels each way; in between, cells whose corners lie
-/// on one smooth patch are interpolated and all others cast pixel by pixel. Block 1 casts every pixel. [main]
+/// Casts the camera's image with `threads` threads. A ray each `block` pixels each way; in between, cells whose corners
+/// lie on one smooth patch are interpolated and all others cast pixel by pixel. Block 1 casts every pixel. [main]
 PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, int threads, const Progress& progress);
 
 /// What a picture will take, from the lattice of an image with a ray each `block` pixels.
@@ -62,6 +62,7 @@ struct EdgePixel {
 
 /// Casts the pixels that differ most from a neighbour (outline, jump of depth, bend of more than about 11 degrees), at
 /// most `most` of them, four times. [main]
-std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most, int threads);
+std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most,
+                                  int threads);
 
 }  // namespace asperity

@@ -29,10 +29,12 @@ std::string escaped(std::string_view text) {
 }
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) text.replace(at, from.size(), to);
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
 }
 
-/// JSON that cannot end the script element it stands in, whatever its texts hold. Bytes that are not UTF-8 are replaced.
+/// JSON that cannot end the script element it stands in, whatever its texts hold. Bytes that are not UTF-8 are
+/// replaced.
 std::string script_json(const nlohmann::json& data) {
   std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   replace_all(text, "<", "\\u003c");
@@ -49,7 +51,8 @@ std::string base64(std::string_view bytes) {
   out.reserve((bytes.size() + 2) / 3 * 4);
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
     for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[group >> (18U - 6U * k) & 63U];
   }
   return out;
@@ -64,25 +67,34 @@ std::string asset(std::size_t index) {
 }
 
 std::string page(const std::string& title, const nlohmann::json& data, const std::optional<Picture>& picture) {
-  const std::string image = picture ? fmt::format("<img id=\"picture-image\" alt=\"The touched surface with the stroke, coloured by force\" "
-                                                  "width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\">",
-                                                  picture->image.width, picture->image.height, base64(picture->png))
-                                    : std::string();
+  const std::string image =
+      picture ? fmt::format(
+                    "<img id=\"picture-image\" alt=\"The touched surface with the stroke, coloured by force\" "
+                    "width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\">",
+                    picture->image.width, picture->image.height, base64(picture->png))
+              : std::string();
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n"
       "<style>{}\n{}</style>\n</head>\n<body>\n<main id=\"page\"></main>\n<div id=\"picture-store\" hidden>{}</div>\n"
-      "<noscript><p>This page draws its tables and plots with a script that it carries itself. Scripts are turned off.</p></noscript>\n"
-      "<script type=\"application/json\" id=\"data\">{}</script>\n<script>{}</script>\n<script>{}</script>\n</body>\n</html>\n",
+      "<noscript><p>This page draws its tables and plots with a script that it carries itself. Scripts are turned "
+      "off.</p></noscript>\n"
+      "<script type=\"application/json\" "
+      "id=\"data\">{}</script>\n<script>{}</script>\n<script>{}</script>\n</body>\n</html>\n",
       escaped(title), asset(3), asset(1), image, script_json(data), asset(2), asset(0));
 }
 
-std::string share(double fraction) { return fraction < 1e-4 ? "less than 0.01 %" : fmt::format("{:.2g} %", 100.0 * fraction); }
+std::string share(double fraction) {
+  return fraction < 1e-4 ? "less than 0.01 %" : fmt::format("{:.2g} %", 100.0 * fraction);
+}
 
-std::string length_words(double metres) { return metres < 1e-9 ? "less than a nanometre" : format_length(metres); }
+std::string length_words(double metres) {
+  return metres < 1e-9 ? "less than a nanometre" : format_length(metres);
+}
 
 std::string height_words(const RunMetrics& m) {
-  if (m.height.samples == 0) return m.height.excluded > 0 ? "touched only within a texel of steps" : "was not in contact along the stroke";
+  if (m.height.samples == 0)
+    return m.height.excluded > 0 ? "touched only within a texel of steps" : "was not in contact along the stroke";
   if (m.height.amplitude > 0.0) {
     return fmt::format("followed a relief of {} to within {} RMS ({} of its height)", format_length(m.height.amplitude),
                        length_words(m.height.rms_error), share(m.height.relative_error));
@@ -91,32 +103,40 @@ std::string height_words(const RunMetrics& m) {
 }
 
 /// Energies within this share of what the contact took up are rounding and sampling, not activity.
-bool passive(const EnergyMetrics& energy) { return energy.generated <= 1e-3 * energy.absorbed + 1e-9; }
+bool passive(const EnergyMetrics& energy) {
+  return energy.generated <= 1e-3 * energy.absorbed + 1e-9;
+}
 
 }  // namespace
 
 std::string summarise(const RunReport& report) {
   const RunMetrics& m = report.metrics;
-  std::string text = fmt::format("{} ticks at {:.6g} Hz ({:.3g} s), {} of them in contact. ", m.ticks.ticks, m.ticks.rate, m.ticks.duration,
-                                 m.ticks.contact);
+  std::string text = fmt::format("{} ticks at {:.6g} Hz ({:.3g} s), {} of them in contact. ", m.ticks.ticks,
+                                 m.ticks.rate, m.ticks.duration, m.ticks.contact);
   if (m.ticks.contact == 0) return text + "Nothing was touched: no force was felt.";
-  text += fmt::format("The probe travelled {:.3g} mm and felt {:.3g} N on average, {:.3g} N at most. It {}. ", 1e3 * m.ticks.length, m.force.mean,
-                      m.force.max, height_words(m));
-  text += passive(m.energy) ? "The contact gave back no more energy than it had taken. "
-                            : fmt::format("The contact gave back {:.3g} mJ more than it had taken. ", 1e3 * m.energy.generated);
-  text += m.ticks.safety_interventions == 0 ? "The safety stage changed nothing. "
-                                            : fmt::format("The safety stage changed {} ticks. ", m.ticks.safety_interventions);
-  return text + fmt::format("An update took {:.3g} us (median), {:.3g} us at p99.9.", 1e6 * m.update.p50, 1e6 * m.update.p999);
+  text += fmt::format("The probe travelled {:.3g} mm and felt {:.3g} N on average, {:.3g} N at most. It {}. ",
+                      1e3 * m.ticks.length, m.force.mean, m.force.max, height_words(m));
+  text += passive(m.energy)
+              ? "The contact gave back no more energy than it had taken. "
+              : fmt::format("The contact gave back {:.3g} mJ more than it had taken. ", 1e3 * m.energy.generated);
+  text += m.ticks.safety_interventions == 0
+              ? "The safety stage changed nothing. "
+              : fmt::format("The safety stage changed {} ticks. ", m.ticks.safety_interventions);
+  return text +
+         fmt::format("An update took {:.3g} us (median), {:.3g} us at p99.9.", 1e6 * m.update.p50, 1e6 * m.update.p999);
 }
 
 std::string verdict(const RunMetrics& m) {
   if (m.ticks.contact == 0) return "no contact";
-  std::string text = m.height.samples == 0 ? std::string(m.height.excluded > 0 ? "contact only within a texel of steps" : "no contact along the stroke")
-                     : m.height.amplitude <= 0.0   ? std::string("no relief to follow")
-                     : fmt::format("height error {} of the relief", share(m.height.relative_error));
+  std::string text =
+      m.height.samples == 0
+          ? std::string(m.height.excluded > 0 ? "contact only within a texel of steps" : "no contact along the stroke")
+      : m.height.amplitude <= 0.0 ? std::string("no relief to follow")
+                                  : fmt::format("height error {} of the relief", share(m.height.relative_error));
   if (m.height.amplitude > 0.0 && m.height.excursion < 0.05 * m.height.amplitude) text += "; renders no height";
   const double degrees = m.direction.mean * 180.0 / std::numbers::pi;
-  if (m.direction.samples > 0) text += degrees < 0.01 ? "; direction right" : fmt::format("; direction {:.2g} deg off on average", degrees);
+  if (m.direction.samples > 0)
+    text += degrees < 0.01 ? "; direction right" : fmt::format("; direction {:.2g} deg off on average", degrees);
   text += passive(m.energy) ? "; feeds no energy" : fmt::format("; feeds {:.2g} mJ", 1e3 * m.energy.generated);
   if (m.ticks.safety_interventions > 0) text += fmt::format("; {} ticks limited", m.ticks.safety_interventions);
   return text;
@@ -128,8 +148,10 @@ Result<std::string> run_report_html(const RunReport& report) {
 }
 
 Result<std::string> compare_report_html(const CompareReport& report) {
-  if (report.entries.empty()) return Error{ErrorCode::bad_value, "has no laws to compare", "", "entries", "one law or more"};
-  for (std::size_t i = 0; i < report.entries.size(); ++i) ASPERITY_CHECK(check_series(report.entries[i].series, fmt::format("entries[{}].series", i)));
+  if (report.entries.empty())
+    return Error{ErrorCode::bad_value, "has no laws to compare", "", "entries", "one law or more"};
+  for (std::size_t i = 0; i < report.entries.size(); ++i)
+    ASPERITY_CHECK(check_series(report.entries[i].series, fmt::format("entries[{}].series", i)));
   return page(report.origin.title + " - Asperity comparison", compare_data(report), report.picture);
 }
 

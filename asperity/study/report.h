@@ -14,11 +14,11 @@ namespace asperity {
 
 /// What both kinds of report say about where they come from. Plain text throughout; it is escaped on the way out.
 struct ReportOrigin {
-  std::string title;    ///< the scene's name, or what else the page should be called
-  std::string command;  ///< the command line that makes it again
-  std::string machine;  ///< processor and system, one line; may be empty
-  std::string date;     ///< as it should stand on the page; the report reads no clock
-  std::string program;  ///< name and version
+  std::string title;                  ///< the scene's name, or what else the page should be called
+  std::string command;                ///< the command line that makes it again
+  std::string machine;                ///< processor and system, one line; may be empty
+  std::string date;                   ///< as it should stand on the page; the report reads no clock
+  std::string program;                ///< name and version
   std::vector<std::string> warnings;  ///< shown first
   std::vector<std::string> notes;     ///< what was decided for the user
 };

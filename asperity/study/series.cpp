@@ -69,8 +69,8 @@ class SeriesBuilder {
  public:
   SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks)
       : scene_(scene), path_(path), hints_(std::make_unique<Hint[]>(scene.instances().size())) {
-    for (auto* column : {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.followed, &out_.relief,
-                         &out_.direction_error, &out_.work, &out_.stored, &out_.update}) {
+    for (auto* column : {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.followed,
+                         &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.update}) {
       column->reserve(ticks);
     }
   }
@@ -130,7 +130,8 @@ class SeriesBuilder {
     add_direction(*instance, at, force);
     if (const Coat* coat = coat_of(instance->surface)) {
       const Vec3 along = pose.rotate_inverse(tangent);
-      const bool near = step_along(base.mesh(), *coat, at, along) || step_along(base.mesh(), *coat, at, along.cross(at.up));
+      const bool near =
+          step_along(base.mesh(), *coat, at, along) || step_along(base.mesh(), *coat, at, along.cross(at.up));
       out_.near_step.back() = near ? 1 : 0;
     }
   }

@@ -13,29 +13,33 @@ namespace asperity {
 /// Columns of equal length, one value a tick. SI; not-a-number where a column has no meaning at that tick.
 ///
 /// followed     signed height over the nearest point of the base mesh, less the probe's radius: of the proxy where the
-///              touched law has one (god-object, force shading); else of the probe with the force's own deflection removed,
-///              h + F . n / k, n the base normal, F before the safety stage (quasi-static: damping counts as deflection)
+///              touched law has one (god-object, force shading); else of the probe with the force's own deflection
+///              removed, h + F . n / k, n the base normal, F before the safety stage (quasi-static: damping counts as
+///              deflection)
 /// relief       height of the reconstructed coat over that same base point (m); 0 on a bare mesh
 /// near_step    the base point lies within one texel of a step: a place where the relief changes by more than a quarter
 ///              of its map's whole range within one texel and more steeply than 1 in 1. Looked for along the stroke and
-///              across it, in the plane of the touched triangle. (formulation.md, amendment 16: such samples are left out
-///              of height errors.)
-/// reference    normal of the reconstructed relief at the base point, n - grad H; the face's own on a bare mesh, turned to
+///              across it, in the plane of the touched triangle. (formulation.md, amendment 16: such samples are left
+///              out of height errors.)
+/// reference    normal of the reconstructed relief at the base point, n - grad H; the face's own on a bare mesh, turned
+/// to
 ///              the touched side
 struct RunSeries {
-  std::vector<double> time;           ///< s
-  std::vector<double> distance;       ///< travelled along the stroke since its contact phase began (m), lag of the probe included
-  std::vector<double> force;          ///< magnitude of the commanded force (N)
-  std::vector<double> normal;         ///< commanded force along the stroke's normal (N)
-  std::vector<double> tangential;     ///< commanded force along the direction of travel (N); negative resists
-  std::vector<double> followed;       ///< m; in contact only
-  std::vector<double> relief;         ///< m; in contact only
-  std::vector<double> direction_error;///< angle of the rendered force to the reference normal (rad); from 1 mN on
-  std::vector<double> work;           ///< done on the probe so far by the commanded force (J), trapezoid; positive: fed into the hand
-  std::vector<double> stored;         ///< energy in the spring of the strongest contact, k penetration^2 / 2 (J)
-  std::vector<double> update;         ///< time that `step` took (s)
-  std::vector<char> near_step;        ///< 1 or 0
-  std::vector<char> stroking;         ///< 1 in the stroke's contact phase
+  std::vector<double> time;  ///< s
+  std::vector<double>
+      distance;  ///< travelled along the stroke since its contact phase began (m), lag of the probe included
+  std::vector<double> force;            ///< magnitude of the commanded force (N)
+  std::vector<double> normal;           ///< commanded force along the stroke's normal (N)
+  std::vector<double> tangential;       ///< commanded force along the direction of travel (N); negative resists
+  std::vector<double> followed;         ///< m; in contact only
+  std::vector<double> relief;           ///< m; in contact only
+  std::vector<double> direction_error;  ///< angle of the rendered force to the reference normal (rad); from 1 mN on
+  std::vector<double>
+      work;  ///< done on the probe so far by the commanded force (J), trapezoid; positive: fed into the hand
+  std::vector<double> stored;   ///< energy in the spring of the strongest contact, k penetration^2 / 2 (J)
+  std::vector<double> update;   ///< time that `step` took (s)
+  std::vector<char> near_step;  ///< 1 or 0
+  std::vector<char> stroking;   ///< 1 in the stroke's contact phase
   [[nodiscard]] std::size_t size() const noexcept { return time.size(); }
 };
 

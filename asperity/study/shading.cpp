@@ -21,7 +21,9 @@ float to_srgb(double linear) {
 std::vector<double> blurred_depth(const PixelGrid& grid, int radius) {
   const int columns = grid.columns;
   const int rows = grid.rows;
-  const auto index = [&](int x, int y) { return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(x); };
+  const auto index = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(x);
+  };
   std::vector<double> sums(grid.pixels.size(), 0.0);
   std::vector<double> counts(grid.pixels.size(), 0.0);
   for (int y = 0; y < rows; ++y) {

@@ -41,7 +41,8 @@ void add_segment(std::span<const double> segment, std::span<const double> window
   mean /= static_cast<double>(segment.size());
   std::vector<kiss_fft_scalar> input(segment.size());
   std::vector<kiss_fft_cpx> output(segment.size() / 2 + 1);
-  for (std::size_t i = 0; i < segment.size(); ++i) input[i] = static_cast<kiss_fft_scalar>((segment[i] - mean) * window[i]);
+  for (std::size_t i = 0; i < segment.size(); ++i)
+    input[i] = static_cast<kiss_fft_scalar>((segment[i] - mean) * window[i]);
   kiss_fftr(plan, input.data(), output.data());
   for (std::size_t k = 0; k < output.size(); ++k) {
     const double re = static_cast<double>(output[k].r);
@@ -61,7 +62,8 @@ void find_peak(Spectrum& spectrum) {
   const double left = std::log(d[i - 1]);
   const double right = std::log(d[i + 1]);
   const double bend = left - 2.0 * std::log(d[i]) + right;
-  if (bend < 0.0) spectrum.peak_frequency += 0.5 * (left - right) / bend * (spectrum.frequency[1] - spectrum.frequency[0]);
+  if (bend < 0.0)
+    spectrum.peak_frequency += 0.5 * (left - right) / bend * (spectrum.frequency[1] - spectrum.frequency[0]);
 }
 
 }  // namespace
@@ -70,8 +72,8 @@ Spectrum power_spectrum(std::span<const double> signal, double spacing) {
   Spectrum spectrum;
   if (signal.size() < fewest_samples || !(spacing > 0.0) || !std::isfinite(spacing)) return spectrum;
   const std::size_t length = segment_length(signal.size());
-  const std::unique_ptr<kiss_fftr_state, void (*)(void*)> plan(kiss_fftr_alloc(static_cast<int>(length), 0, nullptr, nullptr),
-                                                               [](void* memory) { kiss_fftr_free(memory); });
+  const std::unique_ptr<kiss_fftr_state, void (*)(void*)> plan(
+      kiss_fftr_alloc(static_cast<int>(length), 0, nullptr, nullptr), [](void* memory) { kiss_fftr_free(memory); });
   if (!plan) return spectrum;
   const std::vector<double> window = hann_window(length);
   std::vector<double> power(length / 2 + 1, 0.0);

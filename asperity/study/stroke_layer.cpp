@@ -10,10 +10,10 @@ namespace asperity {
 namespace {
 
 constexpr std::size_t most_points = 20000;
-constexpr double line_radius = 1.0 / 260.0;   // of the image's height
-constexpr double edge_radius = 1.0 / 420.0;   // of the dark edge around it
+constexpr double line_radius = 1.0 / 260.0;  // of the image's height
+constexpr double edge_radius = 1.0 / 420.0;  // of the dark edge around it
 constexpr double edge_opacity = 0.55;
-constexpr double depth_slack = 0.012;         // of the view's height: the felt point rests on the surface, not before it
+constexpr double depth_slack = 0.012;  // of the view's height: the felt point rests on the surface, not before it
 
 struct FeltPoint {
   Vec3 image;  // pixel x, y and depth
@@ -28,10 +28,15 @@ struct Layer {
   std::vector<float> edge;
   std::vector<double> force;
   Layer(int w, int h)
-      : width(w), height(h), line(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), 0.0F), edge(line), force(line.size(), 0.0) {}
+      : width(w),
+        height(h),
+        line(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), 0.0F),
+        edge(line),
+        force(line.size(), 0.0) {}
 };
 
-/// Stretches of points in contact; a point each few ticks where a run is long, with the largest force of those it stands for.
+/// Stretches of points in contact; a point each few ticks where a run is long, with the largest force of those it
+/// stands for.
 std::vector<std::vector<FeltPoint>> felt_stretches(const Camera& camera, std::span<const TraceRecord> records) {
   const std::size_t stride = records.size() / most_points + 1;
   std::vector<std::vector<FeltPoint>> stretches;
@@ -58,15 +63,20 @@ std::vector<std::vector<FeltPoint>> felt_stretches(const Camera& camera, std::sp
 class Pen {
  public:
   Pen(const Camera& camera, const Shaded& shaded, Layer& layer)
-      : shaded_(shaded), layer_(layer), radius_(std::max(1.4, line_radius * camera.height)),
-        edge_(radius_ + std::max(0.9, edge_radius * camera.height)), slack_(depth_slack * camera.height * camera.pixel) {}
+      : shaded_(shaded),
+        layer_(layer),
+        radius_(std::max(1.4, line_radius * camera.height)),
+        edge_(radius_ + std::max(0.9, edge_radius * camera.height)),
+        slack_(depth_slack * camera.height * camera.pixel) {}
 
   void segment(const FeltPoint& a, const FeltPoint& b) {
     const double reach = edge_ + 1.0;
     const int left = std::max(0, static_cast<int>(std::floor(std::min(a.image.x(), b.image.x()) - reach)));
-    const int right = std::min(layer_.width - 1, static_cast<int>(std::ceil(std::max(a.image.x(), b.image.x()) + reach)));
+    const int right =
+        std::min(layer_.width - 1, static_cast<int>(std::ceil(std::max(a.image.x(), b.image.x()) + reach)));
     const int top = std::max(0, static_cast<int>(std::floor(std::min(a.image.y(), b.image.y()) - reach)));
-    const int bottom = std::min(layer_.height - 1, static_cast<int>(std::ceil(std::max(a.image.y(), b.image.y()) + reach)));
+    const int bottom =
+        std::min(layer_.height - 1, static_cast<int>(std::ceil(std::max(a.image.y(), b.image.y()) + reach)));
     for (int y = top; y <= bottom; ++y) {
       for (int x = left; x <= right; ++x) touch(x, y, a, b);
     }
@@ -83,7 +93,8 @@ class Pen {
     const double distance = std::hypot(px - u * dx, py - u * dy);
     if (distance > edge_ + 0.5) return;
     const double depth = a.image.z() + u * (b.image.z() - a.image.z());
-    const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(layer_.width) + static_cast<std::size_t>(x);
+    const std::size_t i =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(layer_.width) + static_cast<std::size_t>(x);
     if (depth * (1.0 - slack_) > static_cast<double>(shaded_.depths[i])) return;
     const auto line = static_cast<float>(std::clamp(radius_ + 0.5 - distance, 0.0, 1.0));
     layer_.edge[i] = std::max(layer_.edge[i], static_cast<float>(std::clamp(edge_ + 0.5 - distance, 0.0, 1.0)));
@@ -112,7 +123,8 @@ ForceRange force_range(const std::vector<double>& forces) {
 
 }  // namespace
 
-ForceRange draw_stroke(const Camera& camera, std::span<const TraceRecord> records, const Shaded& shaded, std::vector<Colour>& colours) {
+ForceRange draw_stroke(const Camera& camera, std::span<const TraceRecord> records, const Shaded& shaded,
+                       std::vector<Colour>& colours) {
   const auto stretches = felt_stretches(camera, records);
   std::vector<double> forces;
   Layer layer(shaded.width, shaded.height);
@@ -129,8 +141,10 @@ ForceRange draw_stroke(const Camera& camera, std::span<const TraceRecord> record
     if (layer.edge[i] <= 0.0F) continue;
     blend(colours[i], {0.07F, 0.07F, 0.10F}, edge_opacity * static_cast<double>(layer.edge[i]));
     const auto rgb = force_colour(span > 0.0 ? (layer.force[i] - range.low) / span : 0.0);
-    blend(colours[i], {static_cast<float>(rgb[0]) / 255.0F, static_cast<float>(rgb[1]) / 255.0F, static_cast<float>(rgb[2]) / 255.0F},
-          static_cast<double>(layer.line[i]));
+    blend(
+        colours[i],
+        {static_cast<float>(rgb[0]) / 255.0F, static_cast<float>(rgb[1]) / 255.0F, static_cast<float>(rgb[2]) / 255.0F},
+        static_cast<double>(layer.line[i]));
   }
   return range;
 }

@@ -15,8 +15,9 @@ struct ForceRange {
   double high = 0.0;
 };
 
-/// Draws where the surface was felt, coloured by the commanded force, over `colours` (as large as `shaded`). Parts behind
-/// the surface stay hidden. [main]
-ForceRange draw_stroke(const Camera& camera, std::span<const TraceRecord> records, const Shaded& shaded, std::vector<Colour>& colours);
+/// Draws where the surface was felt, coloured by the commanded force, over `colours` (as large as `shaded`). Parts
+/// behind the surface stay hidden. [main]
+ForceRange draw_stroke(const Camera& camera, std::span<const TraceRecord> records, const Shaded& shaded,
+                       std::vector<Colour>& colours);
 
 }  // namespace asperity

@@ -11,6 +11,8 @@ namespace {
 // A root is bracketed this tightly, relative to a texel.
 constexpr double root_of_texel = 1e-6;
 constexpr double least_step_of_texel = 0.25;
+// Far over the relief a step is this share of the height over it.
+constexpr double share_of_height = 0.25;
 constexpr int step_limit = 100000;
 
 }  // namespace
@@ -63,7 +65,7 @@ SweptHit ReliefSurface::segment(const Segment& motion, double radius, Sides side
     const double above = here.value + here.height - highest;
     const double bounded = std::abs(here.value - radius) / lipschitz_;
     before = travelled;
-    travelled = std::min(length, travelled + std::max({above, bounded, least}));
+    travelled = std::min(length, travelled + std::max({above, bounded, least, share_of_height * std::abs(here.value - radius)}));
     here = eval(motion.from + (travelled / length) * direction, hint);
     const double now = here.value >= radius ? 1.0 : -1.0;
     if (now == sign) continue;

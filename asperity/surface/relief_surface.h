@@ -17,8 +17,8 @@ class ReliefSurface {
   ReliefSurface(MeshSurface base, Coat coat);
 
   /// First point of a motion where value(p) = radius, from either side unless `sides` is front (then only from outside).
-  /// Conservative by the slopes' bound down to a quarter of a texel: a feature thinner than that
-  /// along the motion can be stepped over.
+  /// Steps are as long as the slopes' bound allows, and at least a quarter of a texel or of the height over the relief: a
+  /// feature thinner than that along the motion can be stepped over.
   [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
   void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept;
   /// The foot of p by the first-order distance value / |gradient|, moved along the gradient. Reaches as far as the base

@@ -161,7 +161,7 @@ TEST_F(Program, EveryOptionReachesTheScene) {
   EXPECT_EQ(surface["material"]["stiffness"], 500.0);
   EXPECT_EQ(surface["material"]["damping"], 0.25);
   EXPECT_EQ(surface["coat"]["height"], 0.001);
-  EXPECT_EQ(surface["coat"]["tile"], 0.009);
+  EXPECT_DOUBLE_EQ(surface["coat"]["tile"].get<double>(), 0.009);
   EXPECT_EQ(surface["coat"]["channel"], "luminance");
   EXPECT_EQ(surface["coat"]["white_is"], "deep");
   EXPECT_EQ(surface["coat"]["mapping"], "triplanar");
@@ -175,7 +175,7 @@ TEST_F(Program, EveryOptionReachesTheScene) {
   EXPECT_EQ(run("replay o/trace.asptrace").code, 0);
   // What described the scene's own map does not describe another one: its height is the default again.
   std::string low = read("quick.json");
-  low.replace(low.find("\"1mm\"}"), 6, "\".3mm\"");
+  low.replace(low.find("\"1mm\"}"), 5, "\"0.3mm\"");
   write("low.json", low);
   ASSERT_EQ(run("touch low.json --relief map.png --no-report --out r").code, 0);
   EXPECT_NEAR(
@@ -206,11 +206,17 @@ TEST_F(Program, ReplayIsBitEqualAndSaysWhenNot) {
 
   // A flipped bit and a cut file.
   std::string bytes = read(path);
-  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  const std::size_t late = bytes.size() * 3 / 4;
+  bytes[late] = static_cast<char>(bytes[late] ^ 1);
   write("flipped.asptrace", bytes);
   const Call flipped = run("replay flipped.asptrace");
   EXPECT_EQ(flipped.code, 1);
   EXPECT_TRUE(has(flipped.err, "not whole")) << flipped.err;
+  bytes[bytes.size() / 8] = static_cast<char>(bytes[bytes.size() / 8] ^ 1);
+  write("early.asptrace", bytes);
+  const Call early = run("replay early.asptrace");
+  EXPECT_EQ(early.code, 2);
+  EXPECT_TRUE(has(early.err, "holds no whole tick")) << early.err;
   write("cut.asptrace", read(path).substr(0, bytes.size() - 100));
   EXPECT_EQ(run("replay cut.asptrace").code, 1);
 }

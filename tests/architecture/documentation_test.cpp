@@ -14,7 +14,8 @@ namespace {
 bool is_private(const SourceFile& header) {
   const auto end = header.lines.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, header.lines.size()));
   return std::any_of(header.lines.begin(), end, [](const std::string& line) {
-    return line.rfind("// ", 0) == 0 && (line.find("Private to ") != std::string::npos || line.find("private to ") != std::string::npos);
+    return line.rfind("// ", 0) == 0 &&
+           (line.find("Private to ") != std::string::npos || line.find("private to ") != std::string::npos);
   });
 }
 
@@ -36,7 +37,8 @@ TEST(Documentation, FreeFunctionsNameTheThreadTheyAreFor) {
     for (const Declaration& declaration : declarations(header)) {
       if (!declaration.is_function) continue;
       const std::array<const char*, 4> tags = {"[servo]", "[build]", "[main]", "[any]"};
-      EXPECT_TRUE(std::any_of(tags.begin(), tags.end(), [&](const char* tag) { return declaration.docstring.find(tag) != std::string::npos; }))
+      EXPECT_TRUE(std::any_of(tags.begin(), tags.end(),
+                              [&](const char* tag) { return declaration.docstring.find(tag) != std::string::npos; }))
           << header.path << ":" << declaration.line << ": " << declaration.text;
     }
   }
@@ -67,7 +69,8 @@ TEST(Documentation, FirstProgramHasTenLinesAndStandsInTheReadme) {
 
   const std::vector<SourceFile> readme = files_below("README.md", {".md"});
   if (readme.empty()) GTEST_SKIP() << "there is no README.md yet";
-  EXPECT_EQ(lines_between(readme.front(), "```cpp", "```"), examples.front().lines) << "README.md shows another program than examples/first_touch.cpp";
+  EXPECT_EQ(lines_between(readme.front(), "```cpp", "```"), examples.front().lines)
+      << "README.md shows another program than examples/first_touch.cpp";
 }
 
 }  // namespace

@@ -32,8 +32,10 @@ TEST(Layers, ModulesIncludeOnlyModulesAboveThem) {
       const std::string name = included(file.lines[i]);
       if (name.empty() || name.front() != '"') continue;
       const std::string other = module_of(name.substr(1));
-      EXPECT_FALSE(other.empty()) << file.path << ":" << i + 1 << ": includes " << name << "; modules include \"asperity/MODULE/...\" only";
-      EXPECT_LE(place_in_order(other), place_in_order(module)) << file.path << ":" << i + 1 << ": " << module << " may not include " << name;
+      EXPECT_FALSE(other.empty()) << file.path << ":" << i + 1 << ": includes " << name
+                                  << "; modules include \"asperity/MODULE/...\" only";
+      EXPECT_LE(place_in_order(other), place_in_order(module))
+          << file.path << ":" << i + 1 << ": " << module << " may not include " << name;
       if (module == "render") {
         EXPECT_EQ(std::count(not_for_render.begin(), not_for_render.end(), other), 0) << file.path << ":" << i + 1;
       }

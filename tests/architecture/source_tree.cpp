@@ -13,14 +13,18 @@ namespace fs = std::filesystem;
 bool is_text(const fs::path& path) {
   static const std::vector<std::string> endings = {".h",    ".cpp", ".txt", ".cmake", ".in",  ".md",  ".json",
                                                    ".html", ".js",  ".css", ".bib",   ".yml", ".yaml"};
-  static const std::vector<std::string> names = {"run", "test", "build", "tidy", "install-packages", ".clang-format", ".clang-tidy", ".gitignore"};
-  const auto among = [](const auto& list, const std::string& value) { return std::find(list.begin(), list.end(), value) != list.end(); };
+  static const std::vector<std::string> names = {
+      "run", "test", "build", "tidy", "install-packages", ".clang-format", ".clang-tidy", ".gitignore"};
+  const auto among = [](const auto& list, const std::string& value) {
+    return std::find(list.begin(), list.end(), value) != list.end();
+  };
   return among(endings, path.extension().string()) || among(names, path.filename().string());
 }
 
 bool is_left_out(const fs::path& folder) {
   const std::string name = folder.filename().string();
-  return name == ".git" || name == "node_modules" || (folder.parent_path() == fs::path(ASPERITY_SOURCE_DIR) && (name == "build" || name == "out"));
+  return name == ".git" || name == "node_modules" ||
+         (folder.parent_path() == fs::path(ASPERITY_SOURCE_DIR) && (name == "build" || name == "out"));
 }
 
 SourceFile read(const fs::path& path) {
@@ -50,14 +54,18 @@ std::string code_of(const std::string& line) {
   char quote = '\0';
   for (std::size_t i = 0; i < line.size(); ++i) {
     if (quote != '\0') {
-      if (line[i] == '\\') ++i;
-      else if (line[i] == quote) quote = '\0';
+      if (line[i] == '\\')
+        ++i;
+      else if (line[i] == quote)
+        quote = '\0';
       continue;
     }
     if (line.compare(i, 2, "//") == 0) break;
     const bool digit_separator = line[i] == '\'' && i > 0 && std::isalnum(static_cast<unsigned char>(line[i - 1])) != 0;
-    if ((line[i] == '"' || line[i] == '\'') && !digit_separator) quote = line[i];
-    else code += line[i];
+    if ((line[i] == '"' || line[i] == '\'') && !digit_separator)
+      quote = line[i];
+    else
+      code += line[i];
   }
   return code;
 }
@@ -67,7 +75,9 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(' ') - first + 1);
 }
 
-bool starts_with(const std::string& text, std::string_view start) { return text.compare(0, start.size(), start) == 0; }
+bool starts_with(const std::string& text, std::string_view start) {
+  return text.compare(0, start.size(), start) == 0;
+}
 
 /// What a statement at namespace level declares, if it is one of the kinds that want a docstring.
 enum class Kind { none, type, function };
@@ -82,12 +92,14 @@ Kind kind_of(const std::string& statement, bool has_body) {
   }
   const std::size_t parenthesis = statement.find('(');
   const std::size_t assignment = statement.find('=');
-  if (parenthesis == std::string::npos || (assignment < parenthesis && statement.find("operator") == std::string::npos)) return Kind::none;
+  if (parenthesis == std::string::npos || (assignment < parenthesis && statement.find("operator") == std::string::npos))
+    return Kind::none;
   // A qualified name before the parenthesis is a member's definition.
   static const std::regex member(R"([A-Za-z_>]::~?[A-Za-z_]+ ?$)");
   const std::string before = trimmed(statement.substr(0, parenthesis));
   const std::size_t name = before.find_last_of(" &*");
-  return std::regex_search(name == std::string::npos ? before : before.substr(name + 1), member) ? Kind::none : Kind::function;
+  return std::regex_search(name == std::string::npos ? before : before.substr(name + 1), member) ? Kind::none
+                                                                                                 : Kind::function;
 }
 
 /// Walks through a header's lines and gathers what stands at namespace level.
@@ -173,7 +185,8 @@ std::vector<SourceFile> files_below(const std::string& folder, const std::vector
   std::vector<SourceFile> below;
   for (const SourceFile& file : text_files()) {
     const std::string ending = fs::path(file.path).extension().string();
-    if (starts_with(file.path, folder) && std::find(endings.begin(), endings.end(), ending) != endings.end()) below.push_back(file);
+    if (starts_with(file.path, folder) && std::find(endings.begin(), endings.end(), ending) != endings.end())
+      below.push_back(file);
   }
   return below;
 }
@@ -190,6 +203,8 @@ std::string included(const std::string& line) {
   return std::regex_search(line, match, pattern) ? match[1].str() : "";
 }
 
-std::vector<Declaration> declarations(const SourceFile& header) { return Reader().read(header); }
+std::vector<Declaration> declarations(const SourceFile& header) {
+  return Reader().read(header);
+}
 
 }  // namespace asperity::architecture

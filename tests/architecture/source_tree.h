@@ -19,7 +19,8 @@ std::vector<SourceFile> files_below(const std::string& folder, const std::vector
 
 /// "asperity/core/math.h" -> "core"; empty for a path that is not inside a module.
 std::string module_of(const std::string& path);
-/// What an include line includes, its quotes or brackets kept: `"asperity/core/math.h"`, `<png.h>`; empty for other lines.
+/// What an include line includes, its quotes or brackets kept: `"asperity/core/math.h"`, `<png.h>`; empty for other
+/// lines.
 std::string included(const std::string& line);
 
 /// A declaration at namespace level: its first line and whether a docstring (///) stands right before it or on it.
@@ -31,8 +32,8 @@ struct Declaration {
   [[nodiscard]] bool documented() const { return !docstring.empty(); }
 };
 
-/// Classes, structs, enumerations, concepts and free functions that a header declares at namespace level. Left out: what
-/// is only named again (forward declarations, members defined outside their class), aliases, constants and macros.
+/// Classes, structs, enumerations, concepts and free functions that a header declares at namespace level. Left out:
+/// what is only named again (forward declarations, members defined outside their class), aliases, constants and macros.
 /// Reads tokens line by line, not C++: good for headers that clang-format has laid out.
 std::vector<Declaration> declarations(const SourceFile& header);
 

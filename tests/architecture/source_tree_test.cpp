@@ -23,11 +23,29 @@ TEST(SourceTree, ReadsIncludesAndModules) {
 
 TEST(SourceTree, FindsDeclarationsAndTheirDocstrings) {
   const SourceFile header{"x.h",
-                          {"#pragma once", "#define TWICE(x) \\", "  twice(x)", "namespace asperity {", "class Later;", "/// Told.", "struct Told {",
-                           "  void member();", "};", "", "struct Untold {};", "using Alias = int;", "inline constexpr int four = 4;",
-                           "/// Answers. [any]", "int answer(int a,", "           int b = f());", "int silent(char c = '{');", "",
-                           "inline int Told::member() { return 1; }", "template <class T>", "concept Odd = requires(T t) { t.odd(); };",
-                           "const char* name(int);  ///< beside it [any]", "}  // namespace asperity"}};
+                          {"#pragma once",
+                           "#define TWICE(x) \\",
+                           "  twice(x)",
+                           "namespace asperity {",
+                           "class Later;",
+                           "/// Told.",
+                           "struct Told {",
+                           "  void member();",
+                           "};",
+                           "",
+                           "struct Untold {};",
+                           "using Alias = int;",
+                           "inline constexpr int four = 4;",
+                           "/// Answers. [any]",
+                           "int answer(int a,",
+                           "           int b = f());",
+                           "int silent(char c = '{');",
+                           "",
+                           "inline int Told::member() { return 1; }",
+                           "template <class T>",
+                           "concept Odd = requires(T t) { t.odd(); };",
+                           "const char* name(int);  ///< beside it [any]",
+                           "}  // namespace asperity"}};
   const std::vector<Declaration> found = declarations(header);
   ASSERT_EQ(found.size(), 6U);
   const std::vector<std::size_t> lines = {7, 11, 15, 17, 20, 22};

@@ -24,7 +24,8 @@ TEST(Text, HoldsNoTabsNoCarriageReturnsAndNoSpacesAtLineEnds) {
     for (std::size_t i = 0; i < file.lines.size(); ++i) {
       const std::string& line = file.lines[i];
       EXPECT_EQ(line.find_first_of("\t\r"), std::string::npos) << file.path << ":" << i + 1;
-      EXPECT_FALSE(!line.empty() && line.back() == ' ') << file.path << ":" << i + 1 << ": space at the end of the line";
+      EXPECT_FALSE(!line.empty() && line.back() == ' ')
+          << file.path << ":" << i + 1 << ": space at the end of the line";
       EXPECT_FALSE(has_emoji(line)) << file.path << ":" << i + 1;
     }
   }

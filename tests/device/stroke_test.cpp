@@ -203,7 +203,7 @@ TEST(Stroke, DefaultCrossesTheTopOfTheObject) {
   box.include(Vec3(0.02, 0.03, 0.04));
   const StrokeSettings s = default_stroke(box);
   const StrokePath path = build_stroke(s, on_plane).value();
-  EXPECT_NEAR(path.length(), 0.6 * 0.08, 1e-9);
+  EXPECT_NEAR(path.length(), 0.4 * 0.08, 1e-9);
   EXPECT_NEAR((path.contact_end() - path.contact_begin()).count(), 4.0, 1e-6);
   EXPECT_EQ(s.start.y(), 0.03);
 }

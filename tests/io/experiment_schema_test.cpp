@@ -104,7 +104,8 @@ TEST_F(ExperimentSchema, ReaderAndSchemaKnowTheSameKeys) {
 TEST_F(ExperimentSchema, EveryKeyIsDescribed) {
   const json document = schema();
   for (const SceneObjectKeys& entry : scene_object_keys()) {
-    for (const auto& item : properties_of(document, entry.object).items()) {
+    const json properties = properties_of(document, entry.object);
+    for (const auto& item : properties.items()) {
       EXPECT_TRUE(item.value().contains("description") && item.value()["description"].get<std::string>().size() > 8)
           << entry.object << "." << item.key();
     }

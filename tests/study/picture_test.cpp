@@ -68,7 +68,8 @@ TEST(RayCaster, ReliefEndsAtTheRimOfAnOpenSheet) {
 }
 
 TEST(CastImage, InterpolatedCellsAgreeWithCastOnes) {
-  const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
+  const Scene scene =
+      relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
   const StrokePath path = line_path();
   const Camera camera = three_quarter_view(path.points(), Vec3::UnitZ(), 90, 60);
   const PixelGrid every = cast_image(scene, camera, 1, 1, {});
@@ -101,7 +102,8 @@ TEST(Picture, ShowsTheSheetAndTheStrokeInTheColoursOfItsForces) {
     for (int y = 0; y < 80; ++y) {
       for (int x = 0; x < 120; ++x) {
         int off = 0;
-        for (int c = 0; c < 3; ++c) off = std::max(off, std::abs(picture->image.sample(x, y, c) - colour[static_cast<std::size_t>(c)]));
+        for (int c = 0; c < 3; ++c)
+          off = std::max(off, std::abs(picture->image.sample(x, y, c) - colour[static_cast<std::size_t>(c)]));
         count += off < 30 ? 1 : 0;
       }
     }
@@ -129,7 +131,8 @@ TEST(Picture, SameInputsGiveTheSamePictureWithAnyNumberOfThreads) {
   // Hints are caches: an answer may differ in its last bits, a colour by one step.
   ASSERT_EQ(one->image.samples.size(), three->image.samples.size());
   int different = 0;
-  for (std::size_t i = 0; i < one->image.samples.size(); ++i) different += std::abs(one->image.samples[i] - three->image.samples[i]) > 2 ? 1 : 0;
+  for (std::size_t i = 0; i < one->image.samples.size(); ++i)
+    different += std::abs(one->image.samples[i] - three->image.samples[i]) > 2 ? 1 : 0;
   EXPECT_LT(different, 30);
 }
 

@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <unistd.h>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <unistd.h>
 
 #include "tests/study/reports.h"
 
@@ -28,7 +28,8 @@ std::size_t count_of(const std::string& text, const std::string& what) {
 class ReportPage : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists(browser)) GTEST_SKIP() << "no " << browser << ": pages are not opened (Debian package chromium)";
+    if (!std::filesystem::exists(browser))
+      GTEST_SKIP() << "no " << browser << ": pages are not opened (Debian package chromium)";
     folder_ = std::filesystem::temp_directory_path() / ("asperity-page-" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
   }
@@ -38,8 +39,10 @@ class ReportPage : public ::testing::Test {
 
   /// The page's elements after its scripts have run.
   std::string opened(const std::filesystem::path& file) const {
-    const std::string command = std::string("timeout 90 ") + browser + " --headless --no-sandbox --disable-gpu --virtual-time-budget=4000 --user-data-dir='" +
-                                (folder_ / "profile").string() + "' --dump-dom 'file://" + file.string() + "' 2>/dev/null";
+    const std::string command = std::string("timeout 90 ") + browser +
+                                " --headless --no-sandbox --disable-gpu --virtual-time-budget=4000 --user-data-dir='" +
+                                (folder_ / "profile").string() + "' --dump-dom 'file://" + file.string() +
+                                "' 2>/dev/null";
     const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), pclose);
     std::string text;
     std::array<char, 65536> buffer;
@@ -85,7 +88,9 @@ TEST_F(ReportPage, ComparePageDrawsEveryPlot) {
 }
 
 TEST_F(ReportPage, HostileNamesRunNoScript) {
-  const std::string hostile = "</script><script>document.body.dataset.error='ran'</script><img src=x onerror=\"document.body.dataset.error='ran'\">";
+  const std::string hostile =
+      "</script><script>document.body.dataset.error='ran'</script><img src=x "
+      "onerror=\"document.body.dataset.error='ran'\">";
   RunReport report = run_report(hostile);
   report.law = hostile;
   report.origin.notes = report.origin.warnings = {hostile};

@@ -41,8 +41,10 @@ TEST(RunReport, DataParsesBackToTheNumbers) {
   const auto& n = data["laws"][0]["numbers"];
   EXPECT_EQ(n["ticks"], report.metrics.ticks.ticks);
   EXPECT_NEAR(n["force_mean_n"].get<double>(), report.metrics.force.mean, 1e-4 * report.metrics.force.mean);
-  EXPECT_NEAR(n["relief_um"].get<double>(), 1e6 * report.metrics.height.amplitude, 1e-4 * 1e6 * report.metrics.height.amplitude);
-  EXPECT_NEAR(n["absorbed_mj"].get<double>(), 1e3 * report.metrics.energy.absorbed, 1e-4 * 1e3 * report.metrics.energy.absorbed);
+  EXPECT_NEAR(n["relief_um"].get<double>(), 1e6 * report.metrics.height.amplitude,
+              1e-4 * 1e6 * report.metrics.height.amplitude);
+  EXPECT_NEAR(n["absorbed_mj"].get<double>(), 1e3 * report.metrics.energy.absorbed,
+              1e-4 * 1e3 * report.metrics.energy.absorbed);
   EXPECT_TRUE(n["mean_loop_mj"].is_null());
   // Distance, normal, tangential, magnitude of every tick along the stroke, in mm and N.
   const auto& rows = data["laws"][0]["force_distance"]["rows"];
@@ -73,7 +75,8 @@ TEST(RunReport, AsksNoNetworkForAnything) {
 }
 
 TEST(RunReport, HostileTextsStayText) {
-  const std::string hostile = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&\xE2\x80\xA8\xE2\x80\xA9";
+  const std::string hostile =
+      "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&\xE2\x80\xA8\xE2\x80\xA9";
   RunReport report = run_report(hostile);
   const std::string plain = html_of(run_report("sheet"));
   report.law = hostile;
@@ -105,7 +108,9 @@ TEST(RunReport, LongRunsAreThinnedAndKeepTheirExtremes) {
     s.time.push_back(t);
     s.distance.push_back(1e-5 * static_cast<double>(i));
     s.normal.push_back(i == 123456 ? 9.75 : 1.0 + 0.3 * std::sin(t));
-    for (auto* column : {&s.force, &s.tangential, &s.followed, &s.relief, &s.direction_error, &s.work, &s.stored, &s.update}) column->push_back(0.1 * std::cos(t));
+    for (auto* column :
+         {&s.force, &s.tangential, &s.followed, &s.relief, &s.direction_error, &s.work, &s.stored, &s.update})
+      column->push_back(0.1 * std::cos(t));
     s.near_step.push_back(0);
     s.stroking.push_back(1);
   }
@@ -159,7 +164,9 @@ TEST(CompareReport, NothingToCompareIsRefused) {
 }
 
 TEST(WriteReport, WritesThePageAndLeavesNothingBeside) {
-  const auto folder = std::filesystem::temp_directory_path() / ("asperity-report-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "-write");
+  const auto folder =
+      std::filesystem::temp_directory_path() /
+      ("asperity-report-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "-write");
   std::filesystem::create_directories(folder);
   const RunReport report = run_report("sheet");
   ASSERT_TRUE(write_run_report(folder / "report.html", report).ok());

@@ -7,12 +7,14 @@
 namespace asperity::synthetic {
 
 inline ReportOrigin origin(const std::string& title) {
-  return {title, "asperity run sheet --seed 1", "a machine", "21 November 2026", "asperity 0.1.0", {"a warning"}, {"a note"}};
+  return {title,     "asperity run sheet --seed 1", "a machine", "21 November 2026", "asperity 0.1.0", {"a warning"},
+          {"a note"}};
 }
 
 inline RunReport run_report(const std::string& title, bool with_picture = false) {
   const StrokePath path = line_path();
-  const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
+  const Scene scene =
+      relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, HeightFieldLaw{}, Reconstruction::quadratic_bspline);
   const auto records = rendered_along(path, scene);
   RunReport report;
   report.origin = origin(title);
@@ -34,7 +36,8 @@ inline CompareReport compare_report(const std::string& title) {
   CompareReport report;
   report.origin = origin(title);
   for (const std::string& name : law_names()) {
-    const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, law_by_name(name).value(), Reconstruction::quadratic_bspline);
+    const Scene scene = relief_scene({MesostructureKind::rings, 128, 1e-3, 8, 1}, law_by_name(name).value(),
+                                     Reconstruction::quadratic_bspline);
     const auto records = rendered_along(path, scene);
     CompareEntry entry;
     entry.law = name;

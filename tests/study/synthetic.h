@@ -31,10 +31,13 @@ inline Scene scene_of(Surface surface, Law law = GodObjectLaw{}) {
   return Scene::build(std::move(instances), 0.0).value();
 }
 
-inline Scene bare_scene() { return scene_of(std::make_shared<const MeshSurface>(sheet())); }
+inline Scene bare_scene() {
+  return scene_of(std::make_shared<const MeshSurface>(sheet()));
+}
 
 /// The sheet with one map over all of it.
-inline Scene relief_scene(const MesostructureSpec& spec, Law law, Reconstruction reconstruction = Reconstruction::bilinear) {
+inline Scene relief_scene(const MesostructureSpec& spec, Law law,
+                          Reconstruction reconstruction = Reconstruction::bilinear) {
   MeshSurface base = sheet();
   HeightMap heights = generate_height_map(spec, Wrap::repeat, reconstruction).value();
   auto maps = std::make_shared<const Mesostructure>(Mesostructure::build(std::move(heights), Vec2(0.06, 0.06)).value());
@@ -42,7 +45,9 @@ inline Scene relief_scene(const MesostructureSpec& spec, Law law, Reconstruction
   return scene_of(std::make_shared<const ReliefSurface>(std::move(base), std::move(coat)), law);
 }
 
-inline SurfacePoint on_sheet(const Vec3& p) { return {Vec3(p.x(), p.y(), 0.0), Vec3::UnitZ()}; }
+inline SurfacePoint on_sheet(const Vec3& p) {
+  return {Vec3(p.x(), p.y(), 0.0), Vec3::UnitZ()};
+}
 
 /// Straight along x through the middle, 40 mm at 20 mm/s, 1 mm deep.
 inline StrokePath line_path() {
@@ -64,7 +69,8 @@ inline StrokePath circle_path(int turns) {
 
 /// A tick for each period of the path with the probe exactly on it, and a force that is a function of place and time.
 /// In contact during the stroke's contact phase.
-inline std::vector<TraceRecord> records_along(const StrokePath& path, const std::function<Vec3(const Vec3&, double)>& force) {
+inline std::vector<TraceRecord> records_along(const StrokePath& path,
+                                              const std::function<Vec3(const Vec3&, double)>& force) {
   std::vector<TraceRecord> records;
   for (double t = 0.0; t <= path.duration().count(); t = tick * static_cast<double>(records.size())) {
     const StrokePose pose = path.pose(Seconds(t));

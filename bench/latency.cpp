@@ -1,0 +1,104 @@
+// How long one haptic update takes, beside Embree's point query in the same run.
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+
+#include "bench/report.h"
+
+namespace {
+
+using namespace asperity;
+using namespace asperity::bench;
+
+struct Options {
+  bool quick = false;
+  bool check = false;
+  bool json = false;
+  std::size_t updates = 100000;
+  std::size_t cold_updates = 200;
+};
+
+void say(const std::string& what) {
+  if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:<60}", what);
+}
+
+Status measure_all(const Options& options, Report& report) {
+  Effort effort{options.updates, options.cold_updates, 5};
+  std::vector<int> meshes = {3, 5, 6, 7, 8};
+  std::vector<int> reliefs = {0, 3, 6};
+  int map_size = 1024;
+  if (options.quick) {
+    effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
+    meshes = {3, 5, 6};
+    map_size = 256;
+  }
+  for (const int subdivisions : meshes) {
+    say(fmt::format("icosphere of {} triangles", 20 << (2 * subdivisions)));
+    ASPERITY_TRY(Group group, measure_mesh(subdivisions, effort, report.clock_cost));
+    report.groups.push_back(std::move(group));
+  }
+  for (const int subdivisions : reliefs) {
+    say(fmt::format("relief on {} triangles", 20 << (2 * subdivisions)));
+    ASPERITY_TRY(Group group, measure_relief(subdivisions, map_size, effort, report.clock_cost));
+    report.groups.push_back(std::move(group));
+  }
+  say("");
+  say("\r");
+  return success();
+}
+
+int run(const Options& options, const std::string& command) {
+  Report report;
+  report.command = command;
+  report.machine = machine_name();
+  report.date = fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr)));
+  report.clock_cost = clock_cost_ns();
+  if (const Status status = measure_all(options, report); !status) {
+    fmt::print(stderr, "latency: {}\n", status.error().message());
+    return 2;
+  }
+  fmt::print("{}\n", options.json ? report.json() : report.text());
+  if (!options.check) return 0;
+  const std::vector<std::string> failures = report.failures();
+  for (const std::string& failure : failures) fmt::print(stderr, "latency: {}\n", failure);
+  return failures.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    CLI::App app{
+        "Measures how long one haptic update takes, warm and with cold caches, beside Embree's point query in the same "
+        "run."};
+    Options options;
+    app.add_flag("--quick", options.quick, "Smaller meshes and fewer updates, some seconds in all");
+    app.add_flag("--check", options.check,
+                 "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
+    app.add_flag("--json", options.json, "Print JSON in place of the table");
+    app.add_option("--updates", options.updates, "Warm updates a row")
+        ->check(CLI::Range(100, 100000000))
+        ->capture_default_str();
+    app.add_option("--cold-updates", options.cold_updates, "Cold updates a row; each sweeps 64 MB first")
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
+    app.footer("Exit codes: 0 success, 1 a check does not hold, 2 bad input or usage.");
+    std::string command = "latency";
+    for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& problem) {
+      return app.exit(problem) == 0 ? 0 : 2;
+    }
+    return run(options, command);
+  } catch (const std::exception& problem) {
+    std::fprintf(stderr, "latency: %s\n", problem.what());
+    return 2;
+  }
+}

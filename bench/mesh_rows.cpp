@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "asperity/geometry/generators.h"
+#include "asperity/render/step.h"
+#include "bench/embree_peer.h"
+#include "bench/rows.h"
+#include "bench/slide.h"
+
+namespace asperity::bench {
+
+namespace {
+
+constexpr double tracker_bound = 3e-3;  // m: what a tracker that knows the last distance would search within
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A row that slides a probe through `step`.
+Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSurface>& surface,
+                     const std::shared_ptr<const Slide>& slide, double radius) {
+  Instance sphere;
+  sphere.name = "sphere";
+  sphere.surface = surface;
+  sphere.sides = Sides::front;
+  ASPERITY_TRY(Scene scene, Scene::build({sphere}, radius));
+  ProxyState state;
+  ProbeSample probe;
+  probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
+  step(scene, state, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, radius, state, probe](std::size_t tick) mutable {
+    probe.pose.position = slide->probe(tick, radius);
+    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+  });
+}
+
+Row closest_row(const std::shared_ptr<const MeshSurface>& surface, const std::shared_ptr<const Slide>& slide) {
+  return {closest_coherent, [surface, slide, patch = TrianglePatch{}](std::size_t tick) mutable {
+            return surface->index().closest(slide->probe(tick, 0.0), tracker_bound, patch).found();
+          }};
+}
+
+Row closest_anew_row(const std::shared_ptr<const MeshSurface>& surface, const std::shared_ptr<const Slide>& slide) {
+  return {closest_anew, [surface, slide](std::size_t tick) {
+            return surface->index().closest(slide->probe(tick, 0.0), infinity).found();
+          }};
+}
+
+Row embree_row(const char* name, const std::shared_ptr<const EmbreePeer>& peer,
+               const std::shared_ptr<const Slide>& slide, double bound) {
+  return {name, [peer, slide, bound](std::size_t tick) {
+            return std::isfinite(peer->closest(slide->probe(tick, 0.0), bound));
+          }};
+}
+
+/// Largest difference between our distance and Embree's over the slide (m).
+double largest_disagreement(const MeshSurface& surface, const EmbreePeer& peer, const Slide& slide) {
+  double largest = 0.0;
+  TrianglePatch patch;
+  for (std::size_t tick = 0; tick < slide.direction.size(); tick += 7) {
+    const Vec3 p = slide.probe(tick, 0.0);
+    const double ours = surface.index().closest(p, tracker_bound, patch).distance;
+    largest = std::max(
+        {largest, std::abs(ours - peer.closest(p, infinity)), std::abs(ours - peer.closest(p, tracker_bound))});
+  }
+  return largest;
+}
+
+}  // namespace
+
+const RowResult* Group::row(const std::string& name) const {
+  const auto found = std::find_if(rows.begin(), rows.end(), [&](const RowResult& row) { return row.name == name; });
+  return found == rows.end() ? nullptr : &*found;
+}
+
+Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_cost) {
+  Group group;
+  group.kind = "mesh";
+  MeshSource source = icosphere(subdivisions, sphere_radius);
+  Clock::time_point start = Clock::now();
+  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(std::move(source)));
+  group.mesh_build_seconds = seconds_since(start);
+  start = Clock::now();
+  const auto surface = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
+  group.search_build_seconds = seconds_since(start);
+  const auto peer = std::make_shared<const EmbreePeer>(surface->mesh());
+  group.embree_build_seconds = peer->build_seconds();
+  group.triangles = surface->mesh().triangles().size();
+  group.bytes_per_triangle =
+      static_cast<double>(surface->index().memory_bytes()) / static_cast<double>(group.triangles);
+
+  const auto slide = std::make_shared<const Slide>(make_slide(surface->index(), effort.ticks()));
+  group.largest_disagreement = largest_disagreement(*surface, *peer, *slide);
+  std::vector<Row> rows;
+  ASPERITY_TRY(Row point, step_row(god_object_point, surface, slide, 0.0));
+  ASPERITY_TRY(Row ball, step_row(god_object_radius, surface, slide, 1e-3));
+  rows.push_back(std::move(point));
+  rows.push_back(std::move(ball));
+  rows.push_back(closest_row(surface, slide));
+  rows.push_back(closest_anew_row(surface, slide));
+  rows.push_back(embree_row(embree_bounded, peer, slide, tracker_bound));
+  rows.push_back(embree_row(embree_infinite, peer, slide, infinity));
+  group.rows = measure(rows, effort, clock_cost);
+  return group;
+}
+
+}  // namespace asperity::bench

@@ -1,0 +1,174 @@
+#include "bench/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+namespace asperity::bench {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// What `numerator` costs compared with `denominator`, warm medians of one group.
+void add_ratio(std::vector<Ratio>& ratios, const Group& group, const char* numerator, const char* denominator,
+               double bar, double margin) {
+  const RowResult* over = group.row(numerator);
+  const RowResult* under = group.row(denominator);
+  if (over == nullptr || under == nullptr || under->warm.p50 <= 0.0) return;
+  ratios.push_back({fmt::format("{} / {}, {} triangles", numerator, denominator, group.triangles),
+                    over->warm.p50 / under->warm.p50, bar, margin});
+}
+
+/// What a relief row costs on the base where it costs most, compared with the one where it costs least.
+void add_relief_ratios(std::vector<Ratio>& ratios, const std::vector<Group>& groups) {
+  const auto first =
+      std::find_if(groups.begin(), groups.end(), [](const Group& group) { return group.kind == "relief"; });
+  if (first == groups.end()) return;
+  for (const RowResult& row : first->rows) {
+    double least = row.warm.p50;
+    double most = row.warm.p50;
+    for (const Group& group : groups) {
+      const RowResult* same = group.kind == "relief" ? group.row(row.name) : nullptr;
+      if (same == nullptr) continue;
+      least = std::min(least, same->warm.p50);
+      most = std::max(most, same->warm.p50);
+    }
+    if (least > 0.0) ratios.push_back({fmt::format("{}: dearest / cheapest base", row.name), most / least, 1.5, 15.0});
+  }
+}
+
+Json json_of(const Latency& latency) {
+  return {{"updates", latency.updates},
+          {"p50_ns", latency.p50},
+          {"p99_ns", latency.p99},
+          {"p999_ns", latency.p999},
+          {"max_ns", latency.max}};
+}
+
+Json json_of(const Group& group) {
+  Json rows = Json::array();
+  for (const RowResult& row : group.rows) {
+    rows.push_back({{"name", row.name},
+                    {"warm", json_of(row.warm)},
+                    {"cold", json_of(row.cold)},
+                    {"answered_share", row.answered_share}});
+  }
+  return {{"kind", group.kind},
+          {"triangles", group.triangles},
+          {"mesh_build_s", group.mesh_build_seconds},
+          {"search_build_s", group.search_build_seconds},
+          {"embree_build_s", group.embree_build_seconds},
+          {"bytes_per_triangle", group.bytes_per_triangle},
+          {"coat_bytes", group.coat_bytes},
+          {"largest_disagreement_m", group.largest_disagreement},
+          {"rows", rows}};
+}
+
+std::string text_of(const Group& group) {
+  std::string text = fmt::format("\n{} of {} triangles: {:.1f} bytes a triangle", group.kind, group.triangles,
+                                 group.bytes_per_triangle);
+  if (group.coat_bytes > 0) {
+    text += fmt::format(", coat {:.1f} MB\n", static_cast<double>(group.coat_bytes) * 1e-6);
+  } else {
+    text += fmt::format(
+        "; built in {:.3f} s (mesh) + {:.3f} s (search structure), Embree {:.3f} s; distances differ by at most {:.1e} "
+        "m\n",
+        group.mesh_build_seconds, group.search_build_seconds, group.embree_build_seconds, group.largest_disagreement);
+  }
+  text += fmt::format("{:<37}{:>8}{:>8}{:>9}{:>10} |{:>8}{:>8}{:>9}{:>10}\n", "ns", "p50", "p99", "p99.9", "max",
+                      "cold p50", "p99", "p99.9", "max");
+  for (const RowResult& row : group.rows) {
+    text += fmt::format("{:<37}{:>8.0f}{:>8.0f}{:>9.0f}{:>10.0f} |{:>8.0f}{:>8.0f}{:>9.0f}{:>10.0f}\n", row.name,
+                        row.warm.p50, row.warm.p99, row.warm.p999, row.warm.max, row.cold.p50, row.cold.p99,
+                        row.cold.p999, row.cold.max);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<Ratio> Report::ratios() const {
+  std::vector<Ratio> ratios;
+  for (const Group& group : groups) {
+    add_ratio(ratios, group, god_object_point, embree_infinite, 1.0, 3.0);
+    add_ratio(ratios, group, god_object_point, embree_bounded, 0.0, 6.0);
+    add_ratio(ratios, group, god_object_radius, god_object_point, 1.5, 6.0);
+    add_ratio(ratios, group, closest_coherent, embree_bounded, 0.0, 4.0);
+  }
+  add_relief_ratios(ratios, groups);
+  return ratios;
+}
+
+std::vector<std::string> Report::failures() const {
+  std::vector<std::string> failures;
+  for (const Group& group : groups) {
+    for (const RowResult& row : group.rows) {
+      if (row.warm.updates == 0 || row.cold.updates == 0)
+        failures.push_back(fmt::format("{} on {} triangles did not run", row.name, group.triangles));
+      if (row.answered_share < 0.99) {
+        failures.push_back(fmt::format("{} on {} triangles answered only {:.1f} % of its updates", row.name,
+                                       group.triangles, 100.0 * row.answered_share));
+      }
+    }
+    // Embree holds vertices in single precision and its culling ball with them; the distances are in double.
+    if (!(group.largest_disagreement <= 1e-9)) {
+      failures.push_back(fmt::format("on {} triangles our distance and Embree's differ by {:.3e} m", group.triangles,
+                                     group.largest_disagreement));
+    }
+  }
+  for (const Ratio& ratio : ratios()) {
+    if (!(ratio.value <= ratio.margin))
+      failures.push_back(fmt::format("{} is {:.2f}, above {:.2f}", ratio.what, ratio.value, ratio.margin));
+  }
+  return failures;
+}
+
+std::string Report::text() const {
+  std::string text = fmt::format(
+      "{}\n{}, {}\nProbe 1 mm under an icosphere of radius 50 mm, 50 mm/s, 1 kHz. Cold: 64 MB swept before every "
+      "update.\n"
+      "One reading of the clock costs {:.0f} ns, which is taken off.\n",
+      command, machine, date, clock_cost);
+  for (const Group& group : groups) text += text_of(group);
+  text += "\nRatios of warm medians\n";
+  for (const Ratio& ratio : ratios()) {
+    text += fmt::format("{:<78}{:>6.2f}", ratio.what, ratio.value);
+    if (ratio.bar > 0.0)
+      text += fmt::format("   owed: at most {:.1f}{}", ratio.bar, ratio.value <= ratio.bar ? "" : ", missed");
+    text += '\n';
+  }
+  return text;
+}
+
+std::string Report::json() const {
+  Json groups_json = Json::array();
+  for (const Group& group : groups) groups_json.push_back(json_of(group));
+  Json ratios_json = Json::array();
+  for (const Ratio& ratio : ratios()) {
+    Json entry = {{"what", ratio.what}, {"value", ratio.value}};
+    if (ratio.bar > 0.0) entry["bar"] = ratio.bar;
+    ratios_json.push_back(entry);
+  }
+  const Json report = {{"command", command},          {"machine", machine},    {"date", date},
+                       {"clock_cost_ns", clock_cost}, {"groups", groups_json}, {"ratios", ratios_json}};
+  return report.dump(2);
+}
+
+std::string machine_name() {
+  std::ifstream file("/proc/cpuinfo");
+  const std::string key = "model name";
+  std::string name = "unknown processor";
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.compare(0, key.size(), key) != 0 || colon == std::string::npos) continue;
+    name = line.substr(colon + 2);
+    break;
+  }
+  return fmt::format("{}, {} cores", name, std::thread::hardware_concurrency());
+}
+
+}  // namespace asperity::bench

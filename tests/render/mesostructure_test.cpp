@@ -1,0 +1,218 @@
+// Mesostructure blended over adjoining faces: hrm-2010, Algorithm 2.
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "tests/render/fixtures.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+constexpr double rho = 0.05;
+const MesostructureLaw printed{Formulation::literal, rho, Blend::s_shape, {}};
+const MesostructureLaw smooth{Formulation::consistent, rho, Blend::s_shape, {}};
+
+/// M_a with a map that differs from face to face along every edge, always above 0.3 mm.
+std::shared_ptr<const ReliefSurface> stepping_surface() {
+  return coated(trial_mesh_a(), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }), Mapping::per_face);
+}
+
+TEST(MesostructureLiteral, the_printed_band_test_selects_the_corners_not_the_edges) {
+  const auto surface = stepping_surface();
+  const TriangleMesh& mesh = surface->base().mesh();
+  const Scene scene = scene_of(surface, printed);
+  Rng rng(4);
+  int corners = 0;
+  int elsewhere = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const std::uint32_t face = random_face(rng, mesh);
+    Vec3 barycentric = random_barycentric(rng, 1e-4);
+    if (i % 2 == 0) {
+      // Half of them in a corner.
+      const int k = static_cast<int>(rng.below(3));
+      barycentric = 0.06 * barycentric;
+      barycentric[k] += 0.94;
+    }
+    const Vec3 p = point_on(mesh, face, barycentric);
+    const double own = surface->coat().sample(mesh, face, barycentric).height;
+    const double felt = poke(scene, p, p).contact.penetration;
+    if (barycentric.maxCoeff() < 1.0 - rho - 1e-9) {
+      ASSERT_NEAR(felt, own, 1e-12) << "a single sample, also close to an edge: " << barycentric.transpose();
+      ++elsewhere;
+    } else if (barycentric.maxCoeff() > 1.0 - 0.5 * rho) {
+      bool rim = false;
+      for (int e = 0; e < 3; ++e) rim = rim || mesh.neighbour(face, e) == no_index;
+      corners += !rim && std::abs(felt - own) > 1e-6 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(corners, 200) << "in the corners the adjoining faces are averaged in";
+  EXPECT_GT(elsewhere, 1000);
+}
+
+TEST(MesostructureLiteral, the_jump_at_the_middle_of_an_edge_persists_under_the_s_shape) {
+  const Scene scene = scene_of(stepping_surface(), printed);
+  const Vec3 from(-0.0093, -0.0061, 0.0);
+  const Vec3 to(0.0112, 0.0087, 0.0);
+  const auto jump = [&](double step) { return largest_jump(slide(scene, line(from, to, static_cast<int>(std::lround((to - from).norm() / step))))); };
+  const double coarse = jump(1e-6);
+  EXPECT_GT(coarse, 0.02);
+  EXPECT_GT(jump(0.5e-6), 0.9 * coarse);
+}
+
+TEST(MesostructureLiteral, loses_contact_below_the_base_and_never_feels_heights_below_zero) {
+  const auto force = [&](double height, double z) {
+    const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), printed);
+    return poke(scene, Vec3(3e-3, 1e-3, 2e-3), Vec3(3e-3, 1e-3, z)).wrench.force.z();
+  };
+  EXPECT_NEAR(force(1e-3, 0.4e-3), 0.6, 1e-6);
+  EXPECT_NEAR(force(1e-3, -0.4e-3), 0.6, 1e-6);
+  EXPECT_EQ(force(1e-3, -1.001e-3), 0.0);
+  for (const double z : {0.5e-3, 0.0, -0.5e-3, -2e-3}) EXPECT_EQ(force(-1e-3, z), 0.0);
+}
+
+TEST(MesostructureLiteral, the_averaged_normal_is_not_unit) {
+  // Erratum 5: |AN / AW| < 1 where the normals of the adjoining faces differ, so the force is smaller than k times the penetration.
+  const auto surface = coated(trial_mesh_b(std::numbers::pi / 4.0), flat_map(1e-3), Mapping::uv);
+  const TriangleMesh& mesh = surface->base().mesh();
+  const Scene scene = scene_of(surface, printed);
+  double shortest = 1.0;
+  Rng rng(9);
+  for (int i = 0; i < 3000; ++i) {
+    const Vec3 barycentric(0.96, 0.02, 0.02);
+    const Vec3 p = point_on(mesh, random_face(rng, mesh), barycentric);
+    const ForceSample sample = poke(scene, p, p);
+    if (sample.contact.penetration > 0.0) shortest = std::min(shortest, sample.wrench.force.norm() / (stiffness * sample.contact.penetration));
+  }
+  EXPECT_LT(shortest, 0.99);
+}
+
+/// Largest change of force a tick across the ridge of a roof of 30 degrees that wears a coat of 1 mm.
+double jump_across_fold(const Law& law, double step) {
+  static const auto surface = coated(roof(std::numbers::pi / 6.0, 0.01), flat_map(1e-3), Mapping::uv);
+  const Vec3 from(-1.5e-3, 0.7e-3, 0.3e-3);
+  const Vec3 to(1.5e-3, 1.1e-3, 0.3e-3);
+  const auto path = line(from, to, static_cast<int>(std::lround((to - from).norm() / step)));
+  return largest_jump(slide(scene_of(surface, law), path, from + Vec3(0.0, 0.0, 4e-3)));
+}
+
+TEST(Erratum_4, at_a_fold_the_literal_force_jumps_where_the_owner_switches) {
+  const double coarse = jump_across_fold(printed, 2e-6);
+  EXPECT_GT(coarse, 0.1);
+  EXPECT_GT(jump_across_fold(printed, 1e-6), 0.95 * coarse);
+}
+
+TEST(Erratum_4, at_a_fold_the_consistent_change_of_force_scales_with_the_step) {
+  const double ratio = jump_across_fold(smooth, 2e-6) / jump_across_fold(smooth, 1e-6);
+  EXPECT_GT(ratio, 1.6);
+  EXPECT_LT(ratio, 2.4);
+}
+
+/// Largest force difference over pokes in the bands around the edges of M_a.
+double largest_difference(const Law& one, const Law& other) {
+  const auto surface = stepping_surface();
+  const TriangleMesh& mesh = surface->base().mesh();
+  const Scene a = scene_of(surface, one);
+  const Scene b = scene_of(surface, other);
+  Rng rng(12);
+  double largest = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    Vec3 barycentric = random_barycentric(rng);
+    barycentric[0] *= 0.05;
+    barycentric /= barycentric.sum();
+    const Vec3 p = point_on(mesh, random_face(rng, mesh), barycentric) - Vec3(0.0, 0.0, 1e-3);
+    const Vec3 outside = p + Vec3(0.0, 0.0, 5e-3);
+    largest = std::max(largest, (poke(a, outside, p).wrench.force - poke(b, outside, p).wrench.force).norm());
+  }
+  return largest;
+}
+
+TEST(BlendMap, an_image_of_a_linear_ramp_feels_as_the_linear_blend) {
+  std::vector<double> ramp;
+  for (int i = 0; i < 33; ++i) ramp.push_back(i / 32.0);
+  for (const Formulation formulation : {Formulation::literal, Formulation::consistent}) {
+    const MesostructureLaw linear{formulation, rho, Blend::linear, {}};
+    EXPECT_LT(largest_difference(linear, MesostructureLaw{formulation, rho, Blend::image, ramp}), 1e-9);
+    EXPECT_LT(largest_difference(linear, MesostructureLaw{formulation, rho, Blend::image, {0.0, 1.0}}), 1e-9);
+  }
+}
+
+TEST(BlendMap, the_blends_differ_from_one_another) {
+  const MesostructureLaw none{Formulation::consistent, rho, Blend::none, {}};
+  const MesostructureLaw linear{Formulation::consistent, rho, Blend::linear, {}};
+  EXPECT_GT(largest_difference(none, linear), 0.01);
+  EXPECT_GT(largest_difference(linear, smooth), 0.01);
+}
+
+void expect_gradient(const ReliefSurface& surface, const Scene& scene, std::uint64_t seed, double depth, double band) {
+  Rng rng(seed);
+  const TriangleMesh& mesh = surface.base().mesh();
+  const std::uint32_t face = random_face(rng, mesh);
+  for (int e = 0; e < 3; ++e) RC_PRE(mesh.neighbour(face, e) != no_index);
+  Vec3 barycentric = random_barycentric(rng, 0.01);
+  // Most points in the bands, where the weights and their gradients are at work.
+  barycentric[static_cast<int>(rng.below(3))] *= band;
+  barycentric /= barycentric.sum();
+  const Vec3 foot = point_on(mesh, face, barycentric);
+  const Vec3 normal = mesh.face_normal(face);
+  const Vec3 p = foot - rng.uniform(0.8, 1.2) * depth * normal;
+  const Vec3 outside = foot + 3e-3 * normal;
+  const Vec3 force = poke(scene, outside, p).wrench.force;
+  RC_ASSERT(force.norm() > 0.0);
+  RC_ASSERT((force - potential_force(scene, outside, p)).norm() <= 1e-5 * force.norm());
+}
+
+RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_blend_weights_included, (std::uint64_t seed)) {
+  static const auto surface = stepping_surface();
+  static const Scene scene = scene_of(surface, smooth);
+  expect_gradient(*surface, scene, seed, 1e-3, 0.1);
+}
+
+RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_over_folds, (std::uint64_t seed)) {
+  static const auto surface = coated(icosphere(1, 0.02), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }), Mapping::per_face);
+  static const Scene scene = scene_of(surface, smooth);
+  expect_gradient(*surface, scene, seed, 2e-4, 0.1);
+}
+
+RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_under_sharp_corners, (std::uint64_t seed)) {
+  static const auto surface = coated(box_mesh(Vec3(0.04, 0.03, 0.02)), flat_map(5e-4), Mapping::triplanar);
+  static const Scene scene = scene_of(surface, smooth);
+  expect_gradient(*surface, scene, seed, 5e-4, 0.3);
+}
+
+TEST(T1_energy, no_loop_gives_or_takes_energy_under_the_consistent_mesostructure) {
+  // Once with a map that runs over the edges, once with one that steps there and has to be blended.
+  const std::shared_ptr<const ReliefSurface> surfaces[] = {coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv), stepping_surface()};
+  for (const auto& surface : surfaces) {
+    const Scene scene = scene_of(surface, smooth);
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+      Rng rng(seed);
+      const auto loop = random_loop(rng, Vec3(0.0, 0.0, -2.5e-3), 8e-3, 1e-3, 16000);
+      EXPECT_LT(std::abs(loop_work(scene, loop, loop.front() + Vec3(0.0, 0.0, 6e-3))), 1e-6 * stiffness * loop_area(loop)) << seed;
+    }
+  }
+}
+
+TEST(Energy_erratum_10, algorithm_2_gives_0_107_mJ_a_loop_in_the_reference_case) {
+  const Scene scene = scene_of(reference_surface(2e-3), printed);
+  EXPECT_NEAR(std::abs(loop_work(scene, reference_loop(0.2e-3), Vec3(0.0, 1e-3, 5e-3))), 0.107e-3, 0.02 * 0.107e-3);
+}
+
+TEST(Energy_erratum_10, the_consistent_mesostructure_gives_nothing_in_the_reference_case) {
+  const Scene scene = scene_of(reference_surface(0.0), smooth);
+  EXPECT_LT(std::abs(loop_work(scene, reference_loop(-2e-3), Vec3(0.0, 1e-3, 2e-3))), 1e-6 * 1.0e-3 + 1e-9);
+}
+
+TEST(MesostructureConsistent, a_face_round_a_sharp_corner_says_nothing_about_the_depth_here) {
+  const auto surface = coated(box_mesh(Vec3(0.04, 0.03, 0.02)), flat_map(0.0), Mapping::uv);
+  const Scene scene = scene_of(surface, smooth);
+  for (const double x : {0.0, 0.005, 0.012}) {
+    const Vec3 p(x, 0.001, 0.01 - 1e-3);
+    const Vec3 force = poke(scene, p + Vec3(0.0, 0.0, 3e-3), p).wrench.force;
+    EXPECT_LT((force - Vec3(0.0, 0.0, 1e-3 * stiffness)).norm(), 1e-9) << x;
+  }
+}
+
+}  // namespace
+}  // namespace asperity
