@@ -106,28 +106,35 @@ Foot TriangleIndex::closest(const Vec3& p, double bound) const noexcept {
 
 Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept {
   const Bvh* bvh = std::get_if<Bvh>(structure_.get());
-  const double room = patch.certified - (p - patch.centre).norm();
-  if (bvh != nullptr && patch.owner == identity_ && patch.count > 0 && room > 0.0) {
+  if (patch.owner != identity_) patch.last_face = no_index;
+  TrianglePoint best;
+  std::uint32_t best_face = no_index;
+  double reach = bound;
+  const auto offer = [&](std::uint32_t face) {
+    const auto [a, b, c] = mesh_->corners(face);
+    const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
+    if (point.squared_distance >= best.squared_distance || point.squared_distance > reach * reach) return;
+    best = point;
+    best_face = face;
+    reach = std::sqrt(point.squared_distance);
+  };
+  if (patch.last_face != no_index) offer(patch.last_face);
+  if (bvh != nullptr && patch.owner == identity_ && reach < patch.certified - (p - patch.centre).norm()) {
     const double error = bvh->error(p);
-    TrianglePoint best;
-    std::uint32_t best_face = no_index;
-    double reach = std::min(bound, room);
     bvh->scan(patch, p, reach, [&](std::uint32_t face, double distance, const Vec3&) {
-      if (distance > reach + error) return;
-      const auto [a, b, c] = mesh_->corners(face);
-      const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
-      if (point.squared_distance >= best.squared_distance) return;
-      best = point;
-      best_face = face;
-      reach = std::min(reach, std::sqrt(point.squared_distance));
+      if (distance <= reach + error && face != patch.last_face) offer(face);
     });
-    if (best_face != no_index && std::sqrt(best.squared_distance) < std::min(room, bound)) {
-      return surface_foot(best_face, best, p, mesh_->face_normal(best_face));
+  } else {
+    const ClosestHit hit = std::visit([&](const auto& structure) { return structure.closest(p, reach); }, *structure_);
+    if (hit.face != no_index && hit.point.squared_distance < best.squared_distance) {
+      best = hit.point;
+      best_face = hit.face;
     }
+    if (best_face != no_index) gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh_->mean_edge(), patch);
   }
-  const Foot answer = closest(p, bound);
-  if (answer.found()) gather(p, answer.distance + patch_slack_in_edges * mesh_->mean_edge(), patch);
-  return answer;
+  if (best_face == no_index) return {};
+  patch.last_face = best_face;
+  return surface_foot(best_face, best, p, mesh_->face_normal(best_face));
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {

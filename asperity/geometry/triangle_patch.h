@@ -21,6 +21,7 @@ struct TrianglePatch {
   Vec3 centre = Vec3::Zero();  ///< m
   double certified = -1.0;     ///< m
   std::uint32_t count = 0;     ///< leaves
+  std::uint32_t last_face = no_index;  ///< that was nearest last time: its distance bounds the next search
 
   bool rested = false;                ///< whether the following four are valid
   Sides rest_sides = Sides::both;

@@ -111,19 +111,20 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
   ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
   const SceneJson* coat_json = reader.raw("coat");
-  instance.law = coat_json == nullptr ? Law(GodObjectLaw{}) : Law(MesostructureLaw{});
-  reader.write("law", law_json(instance.law));
-  if (const SceneJson* law = reader.raw("law")) {
-    ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));
-    instance.law = std::move(read.value);
-    reader.write("law", std::move(read.canonical));
-  }
   if (coat_json == nullptr) {
     instance.surface = std::make_shared<const MeshSurface>(std::move(base));
   } else {
     ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
     reader.write("coat", std::move(coat.canonical));
+    // Maps that differ from face to face need stitching at the edges; one map over them all runs on by itself.
+    instance.law = coat.value.settings().mapping == Mapping::per_face ? Law(MesostructureLaw{}) : Law(HeightFieldLaw{});
     instance.surface = std::make_shared<const ReliefSurface>(std::move(base), std::move(coat.value));
+  }
+  reader.write("law", law_json(instance.law));
+  if (const SceneJson* law = reader.raw("law")) {
+    ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));
+    instance.law = std::move(read.value);
+    reader.write("law", std::move(read.canonical));
   }
   ASPERITY_CHECK(reader.status());
   return ScenePart<Instance>{std::move(instance), std::move(reader.canonical())};

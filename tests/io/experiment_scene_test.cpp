@@ -71,7 +71,7 @@ TEST_F(ExperimentScene, ACoatChoosesItsMappingAndLaw) {
   const Experiment bare =
       good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"1mm"}}]})");
   EXPECT_EQ(coat_of(bare).settings().mapping, Mapping::triplanar);
-  EXPECT_EQ(law_name(bare.scene.instances()[0].law), "mesostructure");
+  EXPECT_EQ(law_name(bare.scene.instances()[0].law), "height-field");
   EXPECT_NEAR(coat_of(bare).maps().tile().x(), 0.025, 1e-12);   // a quarter of the object
   EXPECT_NEAR(coat_of(bare).maps().tile().y(), 0.0125, 1e-12);  // square pixels of a 16 x 8 map
   EXPECT_TRUE(has_note(bare, "triplanar"));

@@ -10,7 +10,9 @@ namespace {
 
 using namespace test;
 
-ConstraintPlane plane(const Vec3& normal, double offset, double skin = 0.0) { return {normal.normalized(), offset, skin, 0, {}}; }
+ConstraintPlane plane(const Vec3& normal, double offset, double skin = 0.0) {
+  return {normal.normalized(), offset, skin, 0, {}};
+}
 
 /// The same quadratic programme by Hildreth's dual coordinate ascent: slow, and nothing like an active set.
 Vec3 dual_ascent(const Vec3& goal, const PlaneSet& planes) {

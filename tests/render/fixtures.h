@@ -26,7 +26,9 @@ inline Scene scene_of(Surface surface, Law law, double k = stiffness, double pro
   return must(Scene::build(std::move(instances), probe_radius));
 }
 
-inline Law named(std::string_view name) { return must(law_by_name(name)); }
+inline Law named(std::string_view name) {
+  return must(law_by_name(name));
+}
 
 inline ProbeSample probe_at(const Vec3& position) {
   ProbeSample probe;
@@ -34,7 +36,9 @@ inline ProbeSample probe_at(const Vec3& position) {
   return probe;
 }
 
-inline ForceSample touch(const Scene& scene, ProxyState& state, const Vec3& position) { return step(scene, state, probe_at(position), tick); }
+inline ForceSample touch(const Scene& scene, ProxyState& state, const Vec3& position) {
+  return step(scene, state, probe_at(position), tick);
+}
 
 /// One probe that comes from `outside` straight to `position`.
 inline ForceSample poke(const Scene& scene, const Vec3& outside, const Vec3& position) {
@@ -66,9 +70,10 @@ inline double largest_jump(std::span<const Vec3> forces) {
   return largest;
 }
 
-/// Height along `axis` over `base` (m) at which a quasi-static probe, coming down from `above`, is pushed with `force` (N)
-/// along the axis. Found on copies of the state by bisection of the height; the state is left at the answer.
-inline double height_at_force(const Scene& scene, ProxyState& state, const Vec3& base, const Vec3& axis, double force, double above, double below) {
+/// Height along `axis` over `base` (m) at which a quasi-static probe, coming down from `above`, is pushed with `force`
+/// (N) along the axis. Found on copies of the state by bisection of the height; the state is left at the answer.
+inline double height_at_force(const Scene& scene, ProxyState& state, const Vec3& base, const Vec3& axis, double force,
+                              double above, double below) {
   ProxyState best = state;
   touch(scene, best, base + above * axis);
   for (int i = 0; i < 60; ++i) {
@@ -85,7 +90,8 @@ inline double height_at_force(const Scene& scene, ProxyState& state, const Vec3&
   return above;
 }
 
-/// Work that the surface does on a hand led once around a closed path (J), by the trapezoid rule; above 0 it gives energy.
+/// Work that the surface does on a hand led once around a closed path (J), by the trapezoid rule; above 0 it gives
+/// energy.
 inline double loop_work(const Scene& scene, std::span<const Vec3> loop, const Vec3& outside) {
   const std::vector<Vec3> forces = slide(scene, loop, outside);
   double work = 0.0;
@@ -99,7 +105,8 @@ inline double loop_work(const Scene& scene, std::span<const Vec3> loop, const Ve
 /// Size of the vector area that a closed path encloses (m²).
 inline double loop_area(std::span<const Vec3> loop) {
   Vec3 area = Vec3::Zero();
-  for (std::size_t i = 0; i < loop.size(); ++i) area += 0.5 * (loop[i] - loop[0]).cross(loop[(i + 1) % loop.size()] - loop[0]);
+  for (std::size_t i = 0; i < loop.size(); ++i)
+    area += 0.5 * (loop[i] - loop[0]).cross(loop[(i + 1) % loop.size()] - loop[0]);
   return area.norm();
 }
 
@@ -114,18 +121,21 @@ inline std::vector<Vec3> random_loop(Rng& rng, const Vec3& centre, double reach,
   std::vector<Vec3> loop;
   for (int i = 0; i < count; ++i) {
     const double a = 2.0 * std::numbers::pi * i / count;
-    const double x = 0.6 * std::cos(a) + part[0] * std::cos(2.0 * a + phase[0]) + part[1] * 0.3 * std::cos(3.0 * a + phase[1]);
-    const double y = 0.6 * std::sin(a) + part[2] * std::cos(2.0 * a + phase[2]) + part[3] * 0.3 * std::cos(3.0 * a + phase[3]);
+    const double x =
+        0.6 * std::cos(a) + part[0] * std::cos(2.0 * a + phase[0]) + part[1] * 0.3 * std::cos(3.0 * a + phase[1]);
+    const double y =
+        0.6 * std::sin(a) + part[2] * std::cos(2.0 * a + phase[2]) + part[3] * 0.3 * std::cos(3.0 * a + phase[3]);
     const double z = 0.6 * std::cos(a + phase[4]) + part[5] * std::cos(2.0 * a + phase[5]);
     loop.emplace_back(centre + Vec3(reach * x, reach * y, depth * z));
   }
   return loop;
 }
 
-/// The reference case of erratum 10: a cosine relief with a crest at x = 0, 0.5 mm high either way, 5 mm long, on a plane, and
-/// a loop of 2.5 mm (crest to trough) x 1 mm (up and down) in its x-z plane.
+/// The reference case of erratum 10: a cosine relief with a crest at x = 0, 0.5 mm high either way, 5 mm long, on a
+/// plane, and a loop of 2.5 mm (crest to trough) x 1 mm (up and down) in its x-z plane.
 inline HeightMap reference_relief(double middle) {
-  return map_of(1024, [=](double s, double) { return middle + 0.5e-3 * std::cos(2.0 * std::numbers::pi * 4.0 * (s - 0.5)); });
+  return map_of(1024,
+                [=](double s, double) { return middle + 0.5e-3 * std::cos(2.0 * std::numbers::pi * 4.0 * (s - 0.5)); });
 }
 inline std::shared_ptr<const ReliefSurface> reference_surface(double middle) {
   return coated(plane_grid(0.02, 0.02, 1, 1), reference_relief(middle), Mapping::uv, 0.02);
@@ -133,7 +143,8 @@ inline std::shared_ptr<const ReliefSurface> reference_surface(double middle) {
 inline std::vector<Vec3> reference_loop(double lowest, int per_side = 1500) {
   const double width = 2.5e-3;
   const double height = 1e-3;
-  const Vec3 corners[] = {{0.0, 1e-3, lowest}, {0.0, 1e-3, lowest + height}, {width, 1e-3, lowest + height}, {width, 1e-3, lowest}};
+  const Vec3 corners[] = {
+      {0.0, 1e-3, lowest}, {0.0, 1e-3, lowest + height}, {width, 1e-3, lowest + height}, {width, 1e-3, lowest}};
   std::vector<Vec3> loop;
   for (int side = 0; side < 4; ++side) {
     const Vec3 from = corners[side];
@@ -143,14 +154,16 @@ inline std::vector<Vec3> reference_loop(double lowest, int per_side = 1500) {
   return loop;
 }
 
-/// Minus the gradient of k penetration^2 / 2 at `position` (N), by central differences on probes that come straight from `outside`.
+/// Minus the gradient of k penetration^2 / 2 at `position` (N), by central differences on probes that come straight
+/// from `outside`.
 inline Vec3 potential_force(const Scene& scene, const Vec3& outside, const Vec3& position, double h = 1e-7) {
   const auto energy = [&](const Vec3& p) {
     const double penetration = poke(scene, outside, p).contact.penetration;
     return 0.5 * stiffness * penetration * penetration;
   };
   Vec3 force;
-  for (int k = 0; k < 3; ++k) force[k] = -(energy(position + h * Vec3::Unit(k)) - energy(position - h * Vec3::Unit(k))) / (2.0 * h);
+  for (int k = 0; k < 3; ++k)
+    force[k] = -(energy(position + h * Vec3::Unit(k)) - energy(position - h * Vec3::Unit(k))) / (2.0 * h);
   return force;
 }
 

@@ -46,9 +46,11 @@ TEST(ForceShading, pushes_outward_on_the_back_of_an_open_sheet) {
   EXPECT_NEAR(force.norm(), stiffness * p.z(), 1e-9);
 }
 
-/// How often the lateral force along x changes sign while it is stronger than `least` (N), across the centre of H_2's cross.
+/// How often the lateral force along x changes sign while it is stronger than `least` (N), across the centre of H_2's
+/// cross.
 int sign_changes(const Law& law, double depth, double least, double& strongest) {
-  const HeightMap map = must(generate_height_map({MesostructureKind::beams, 96, 1e-3, 1, 1}, Wrap::repeat, Reconstruction::bilinear));
+  const HeightMap map =
+      must(generate_height_map({MesostructureKind::beams, 96, 1e-3, 1, 1}, Wrap::repeat, Reconstruction::bilinear));
   const Scene scene = scene_of(coated(plane_grid(0.03, 0.03, 1, 1), map, Mapping::uv, 0.03), law);
   int changes = 0;
   double last = 0.0;
@@ -58,7 +60,8 @@ int sign_changes(const Law& law, double depth, double least, double& strongest) 
   touch(scene, state, Vec3(0.0, 0.0, 5e-3));
   for (int i = 0; i <= 4000; ++i) {
     const double a = 2.0 * std::numbers::pi * i / 4000.0;
-    const double lateral = touch(scene, state, Vec3(7.5e-3 * std::cos(a), 7.5e-3 * std::sin(a), depth)).wrench.force.x();
+    const double lateral =
+        touch(scene, state, Vec3(7.5e-3 * std::cos(a), 7.5e-3 * std::sin(a), depth)).wrench.force.x();
     strongest = std::max(strongest, std::abs(lateral));
     if (std::abs(lateral) < least) continue;
     if (lateral * last < 0.0) ++changes;

@@ -15,7 +15,9 @@ const HeightFieldLaw printed{Formulation::literal, 0.0};
 
 TEST(HeightFieldLiteral, loses_contact_below_the_base_at_the_depth_of_the_height) {
   const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), printed);
-  const auto force = [&](double z) { return poke(scene, Vec3(3e-3, 1e-3, 2e-3), Vec3(3e-3, 1e-3, z)).wrench.force.z(); };
+  const auto force = [&](double z) {
+    return poke(scene, Vec3(3e-3, 1e-3, 2e-3), Vec3(3e-3, 1e-3, z)).wrench.force.z();
+  };
   // Erratum 1: penetration = Z - |distance|, greatest on the base and falling again below it.
   EXPECT_EQ(force(1.1 * height), 0.0);
   EXPECT_NEAR(force(0.5 * height), 0.5 * stiffness * height, 1e-6);
@@ -25,9 +27,12 @@ TEST(HeightFieldLiteral, loses_contact_below_the_base_at_the_depth_of_the_height
 }
 
 TEST(HeightFieldConsistent, keeps_contact_below_the_base) {
-  const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), named("height-field"));
+  const Scene scene =
+      scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), named("height-field"));
   for (const double z : {0.5e-3, 0.0, -0.5e-3, -1e-3, -5e-3}) {
-    EXPECT_NEAR(poke(scene, Vec3(3e-3, 1e-3, 2e-3), Vec3(3e-3, 1e-3, z)).wrench.force.z(), stiffness * (height - z), 1e-6) << z;
+    EXPECT_NEAR(poke(scene, Vec3(3e-3, 1e-3, 2e-3), Vec3(3e-3, 1e-3, z)).wrench.force.z(), stiffness * (height - z),
+                1e-6)
+        << z;
   }
 }
 
@@ -52,7 +57,9 @@ TEST(HeightFieldLiteral, pushes_along_the_base_normal_alone) {
 
 /// Largest change of force between 1 um left and right of the inner edges of M_a with a map that steps there.
 double step_at_edges(const Law& law, double z, double& strongest) {
-  const auto surface = coated(trial_mesh_a(), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }), Mapping::per_face);
+  const auto surface = coated(
+      trial_mesh_a(), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }),
+      Mapping::per_face);
   const TriangleMesh& mesh = surface->base().mesh();
   const Scene scene = scene_of(surface, law);
   double largest = 0.0;
@@ -85,7 +92,8 @@ TEST(A2_edges, the_taper_of_2005_forces_heights_to_zero_on_every_edge_so_that_no
 }
 
 TEST(A2_edges, on_the_edge_itself_the_tapered_height_is_exactly_zero) {
-  const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), HeightFieldLaw{Formulation::literal, 0.05});
+  const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv),
+                               HeightFieldLaw{Formulation::literal, 0.05});
   // Along the grid's lines x = 0 and y = 0, and its diagonals.
   for (const double along : {-0.017, -0.011, 0.003, 0.013}) {
     for (const Vec3& p : {Vec3(0.0, along, 0.0), Vec3(along, 0.0, 0.0), Vec3(along, along, 0.0)}) {
@@ -107,13 +115,14 @@ void expect_gradient_of_potential(const Scene& scene, std::uint64_t seed) {
 }
 
 RC_GTEST_PROP(HeightFieldConsistent, force_is_minus_the_gradient_of_its_potential, (std::uint64_t seed)) {
-  static const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 4, 4), wavy_map(1e-3), Mapping::uv), named("height-field"));
+  static const Scene scene =
+      scene_of(coated(plane_grid(0.04, 0.04, 4, 4), wavy_map(1e-3), Mapping::uv), named("height-field"));
   expect_gradient_of_potential(scene, seed);
 }
 
 RC_GTEST_PROP(HeightFieldConsistent, force_is_minus_the_gradient_with_a_taper, (std::uint64_t seed)) {
-  static const Scene scene =
-      scene_of(coated(plane_grid(0.04, 0.04, 4, 4), wavy_map(1e-3), Mapping::per_face), HeightFieldLaw{Formulation::consistent, 0.2});
+  static const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 4, 4), wavy_map(1e-3), Mapping::per_face),
+                                      HeightFieldLaw{Formulation::consistent, 0.2});
   expect_gradient_of_potential(scene, seed);
 }
 
@@ -153,7 +162,8 @@ TEST(Energy_erratum_10, the_consistent_height_field_gives_nothing_in_the_referen
 }
 
 TEST(HeightFieldConsistent, comes_in_from_outside_only) {
-  const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), named("height-field"));
+  const Scene scene =
+      scene_of(coated(plane_grid(0.04, 0.04, 2, 2), flat_map(height), Mapping::uv), named("height-field"));
   // From below an open sheet nothing is felt until the probe has been in front of it.
   EXPECT_EQ(poke(scene, Vec3(1e-3, 2e-3, -4e-3), Vec3(1e-3, 2e-3, -1e-3)).wrench.force, Vec3::Zero().eval());
   EXPECT_GT(poke(scene, Vec3(1e-3, 2e-3, 4e-3), Vec3(1e-3, 2e-3, -1e-3)).wrench.force.z(), 0.0);
@@ -166,7 +176,8 @@ TEST(HeightFieldConsistent, a_probe_held_below_an_open_sheet_stays_held) {
     ProxyState state;
     touch(scene, state, Vec3(1e-3, 2e-3, 1e-3));
     for (int i = 0; i < 10; ++i) {
-      ASSERT_NEAR(touch(scene, state, Vec3(1e-3 + 1e-4 * i, 2e-3, -1e-3)).wrench.force.z(), 1e-3 * stiffness, 1e-9) << law << ", tick " << i;
+      ASSERT_NEAR(touch(scene, state, Vec3(1e-3 + 1e-4 * i, 2e-3, -1e-3)).wrench.force.z(), 1e-3 * stiffness, 1e-9)
+          << law << ", tick " << i;
     }
   }
 }

@@ -22,13 +22,16 @@ TEST(LawNames, every_name_makes_the_law_that_bears_it) {
 }
 
 TEST(LawNames, an_unknown_name_is_answered_with_the_nearest_and_the_list) {
-  const std::pair<const char*, const char*> misspelt[] = {
-      {"god-objct", "god-object"}, {"forceshading", "force-shading"}, {"hight-field", "height-field"}, {"mesostructure-litral", "mesostructure-literal"}};
+  const std::pair<const char*, const char*> misspelt[] = {{"god-objct", "god-object"},
+                                                          {"forceshading", "force-shading"},
+                                                          {"hight-field", "height-field"},
+                                                          {"mesostructure-litral", "mesostructure-literal"}};
   for (const auto& [wrong, right] : misspelt) {
     const auto law = law_by_name(wrong);
     ASSERT_FALSE(law.ok()) << wrong;
     EXPECT_EQ(law.error().code, ErrorCode::bad_value);
-    EXPECT_NE(law.error().what.find(std::string("did you mean \"") + right + "\""), std::string::npos) << law.error().message();
+    EXPECT_NE(law.error().what.find(std::string("did you mean \"") + right + "\""), std::string::npos)
+        << law.error().message();
     for (const std::string& name : law_names()) EXPECT_NE(law.error().accepted.find(name), std::string::npos);
   }
   EXPECT_EQ(law_by_name("x").error().what.find("did you mean"), std::string::npos);
@@ -43,11 +46,13 @@ void expect_refused(const Law& law, const std::string& place) {
 }
 
 TEST(LawOptions, each_bad_value_is_named) {
-  for (const double bad : {-1e-9, 0.34, std::nan(""), infinity}) expect_refused(HeightFieldLaw{Formulation::consistent, bad}, "edge_taper");
+  for (const double bad : {-1e-9, 0.34, std::nan(""), infinity})
+    expect_refused(HeightFieldLaw{Formulation::consistent, bad}, "edge_taper");
   for (const double bad : {0.0, -0.1, 0.34, std::nan(""), infinity}) {
     expect_refused(MesostructureLaw{Formulation::consistent, bad, Blend::s_shape, {}}, "rho");
   }
-  for (const std::vector<double>& bad : {std::vector<double>{}, {1.0}, {0.0, 1.1}, {-0.1, 1.0}, {0.0, std::nan(""), 1.0}, {1.0, 0.0}}) {
+  for (const std::vector<double>& bad :
+       {std::vector<double>{}, {1.0}, {0.0, 1.1}, {-0.1, 1.0}, {0.0, std::nan(""), 1.0}, {1.0, 0.0}}) {
     expect_refused(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, bad}, "blend_map");
   }
   EXPECT_TRUE(validate(Law(MesostructureLaw{Formulation::consistent, 1.0 / 3.0, Blend::image, {0.0, 1.0}})).ok());
@@ -139,7 +144,8 @@ RC_GTEST_PROP(NoForceInTheAir, around_a_closed_coated_mesh, (std::uint64_t seed)
   }
 }
 
-/// A pressed walk over a plane through the origin with this normal, a probe of this radius: largest lateral share of the force.
+/// A pressed walk over a plane through the origin with this normal, a probe of this radius: largest lateral share of
+/// the force.
 double largest_lateral(const MeshSource& source, const Vec3& normal, double radius, Rng& rng) {
   const Scene scene = scene_of(bare(source), GodObjectLaw{}, stiffness, radius);
   const Vec3 u = normal.unitOrthogonal();
@@ -172,7 +178,8 @@ TEST(FlatPlane, lateral_force_of_the_god_object_is_exactly_zero_at_every_tick) {
       MeshSource source = plane_grid(0.04, 0.04, 4, 4);
       // Cyclic: keeps the orientation and the coordinates.
       for (Vec3& p : source.positions) p = Vec3(p[(3 - axis) % 3], p[(4 - axis) % 3], p[(5 - axis) % 3]);
-      EXPECT_EQ(largest_lateral(source, Vec3::Unit((2 + axis) % 3), radius, rng), 0.0) << "axis " << axis << ", radius " << radius;
+      EXPECT_EQ(largest_lateral(source, Vec3::Unit((2 + axis) % 3), radius, rng), 0.0)
+          << "axis " << axis << ", radius " << radius;
     }
   }
 }
@@ -237,7 +244,8 @@ std::vector<Vec3> path_around_sphere() {
   std::vector<Vec3> path;
   for (int i = 0; i < 3000; ++i) {
     const double a = 0.004 * i;
-    path.emplace_back((0.0198 - 0.001 * std::sin(0.7 * a)) * Vec3(std::cos(a), std::sin(a) * std::cos(0.3 * a), std::sin(a) * std::sin(0.3 * a)));
+    path.emplace_back((0.0198 - 0.001 * std::sin(0.7 * a)) *
+                      Vec3(std::cos(a), std::sin(a) * std::cos(0.3 * a), std::sin(a) * std::sin(0.3 * a)));
   }
   return path;
 }
@@ -245,7 +253,8 @@ std::vector<Vec3> path_around_sphere() {
 TEST(Units, a_mesh_in_millimetres_feels_as_the_same_mesh_in_metres) {
   for (const std::string& name : law_names()) {
     const Scene metres = scene_of(coated(icosphere(2, 0.02), wavy_map(5e-4), Mapping::triplanar), named(name));
-    const Scene millimetres = scene_of(coated(icosphere(2, 20.0), wavy_map(5e-4), Mapping::triplanar, 0.01, 1e-3), named(name));
+    const Scene millimetres =
+        scene_of(coated(icosphere(2, 20.0), wavy_map(5e-4), Mapping::triplanar, 0.01, 1e-3), named(name));
     const std::vector<Vec3> path = path_around_sphere();
     const auto expected = slide(metres, path, 1.2 * path.front());
     const auto forces = slide(millimetres, path, 1.2 * path.front());
@@ -260,7 +269,8 @@ TEST(Units, a_mesh_in_millimetres_feels_as_the_same_mesh_in_metres) {
 
 TEST(Determinism, the_same_path_twice_gives_the_same_bits) {
   const std::vector<Vec3> path = path_around_sphere();
-  for (const auto& [name, scene] : scenes_of_every_law(coated(icosphere(2, 0.02), wavy_map(5e-4), Mapping::triplanar))) {
+  for (const auto& [name, scene] :
+       scenes_of_every_law(coated(icosphere(2, 0.02), wavy_map(5e-4), Mapping::triplanar))) {
     const auto once = slide(scene, path);
     EXPECT_EQ(once, slide(scene, path)) << name;
     EXPECT_GT(largest_jump(once), 0.0) << name;

@@ -16,7 +16,9 @@ const MesostructureLaw smooth{Formulation::consistent, rho, Blend::s_shape, {}};
 
 /// M_a with a map that differs from face to face along every edge, always above 0.3 mm.
 std::shared_ptr<const ReliefSurface> stepping_surface() {
-  return coated(trial_mesh_a(), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }), Mapping::per_face);
+  return coated(trial_mesh_a(),
+                map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }),
+                Mapping::per_face);
 }
 
 TEST(MesostructureLiteral, the_printed_band_test_selects_the_corners_not_the_edges) {
@@ -55,7 +57,9 @@ TEST(MesostructureLiteral, the_jump_at_the_middle_of_an_edge_persists_under_the_
   const Scene scene = scene_of(stepping_surface(), printed);
   const Vec3 from(-0.0093, -0.0061, 0.0);
   const Vec3 to(0.0112, 0.0087, 0.0);
-  const auto jump = [&](double step) { return largest_jump(slide(scene, line(from, to, static_cast<int>(std::lround((to - from).norm() / step))))); };
+  const auto jump = [&](double step) {
+    return largest_jump(slide(scene, line(from, to, static_cast<int>(std::lround((to - from).norm() / step)))));
+  };
   const double coarse = jump(1e-6);
   EXPECT_GT(coarse, 0.02);
   EXPECT_GT(jump(0.5e-6), 0.9 * coarse);
@@ -73,7 +77,8 @@ TEST(MesostructureLiteral, loses_contact_below_the_base_and_never_feels_heights_
 }
 
 TEST(MesostructureLiteral, the_averaged_normal_is_not_unit) {
-  // Erratum 5: |AN / AW| < 1 where the normals of the adjoining faces differ, so the force is smaller than k times the penetration.
+  // Erratum 5: |AN / AW| < 1 where the normals of the adjoining faces differ, so the force is smaller than k times the
+  // penetration.
   const auto surface = coated(trial_mesh_b(std::numbers::pi / 4.0), flat_map(1e-3), Mapping::uv);
   const TriangleMesh& mesh = surface->base().mesh();
   const Scene scene = scene_of(surface, printed);
@@ -83,7 +88,8 @@ TEST(MesostructureLiteral, the_averaged_normal_is_not_unit) {
     const Vec3 barycentric(0.96, 0.02, 0.02);
     const Vec3 p = point_on(mesh, random_face(rng, mesh), barycentric);
     const ForceSample sample = poke(scene, p, p);
-    if (sample.contact.penetration > 0.0) shortest = std::min(shortest, sample.wrench.force.norm() / (stiffness * sample.contact.penetration));
+    if (sample.contact.penetration > 0.0)
+      shortest = std::min(shortest, sample.wrench.force.norm() / (stiffness * sample.contact.penetration));
   }
   EXPECT_LT(shortest, 0.99);
 }
@@ -170,7 +176,10 @@ RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_blend_weights
 }
 
 RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_over_folds, (std::uint64_t seed)) {
-  static const auto surface = coated(icosphere(1, 0.02), map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }), Mapping::per_face);
+  static const auto surface =
+      coated(icosphere(1, 0.02),
+             map_of(32, [](double s, double t) { return 1e-3 * (0.6 + 0.3 * std::sin(5.0 * s + 3.0 * t)); }),
+             Mapping::per_face);
   static const Scene scene = scene_of(surface, smooth);
   expect_gradient(*surface, scene, seed, 2e-4, 0.1);
 }
@@ -183,13 +192,16 @@ RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_under_sharp_c
 
 TEST(T1_energy, no_loop_gives_or_takes_energy_under_the_consistent_mesostructure) {
   // Once with a map that runs over the edges, once with one that steps there and has to be blended.
-  const std::shared_ptr<const ReliefSurface> surfaces[] = {coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv), stepping_surface()};
+  const std::shared_ptr<const ReliefSurface> surfaces[] = {coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv),
+                                                           stepping_surface()};
   for (const auto& surface : surfaces) {
     const Scene scene = scene_of(surface, smooth);
     for (std::uint64_t seed = 0; seed < 8; ++seed) {
       Rng rng(seed);
       const auto loop = random_loop(rng, Vec3(0.0, 0.0, -2.5e-3), 8e-3, 1e-3, 16000);
-      EXPECT_LT(std::abs(loop_work(scene, loop, loop.front() + Vec3(0.0, 0.0, 6e-3))), 1e-6 * stiffness * loop_area(loop)) << seed;
+      EXPECT_LT(std::abs(loop_work(scene, loop, loop.front() + Vec3(0.0, 0.0, 6e-3))),
+                1e-6 * stiffness * loop_area(loop))
+          << seed;
     }
   }
 }

@@ -12,7 +12,8 @@ using namespace test;
 constexpr double newton_tolerance = 1e-9;
 const char* const coated_laws[] = {"force-shading", "height-field", "mesostructure"};
 
-/// A long path over a flat mesh, pressed in all the time: straight lines through the interior and along a line of vertices.
+/// A long path over a flat mesh, pressed in all the time: straight lines through the interior and along a line of
+/// vertices.
 std::vector<Vec3> pressed_path(const TriangleMesh& mesh, Rng& rng, int points) {
   const Box& box = mesh.bounds();
   std::vector<Vec3> path;
@@ -40,7 +41,8 @@ std::vector<Vec3> strip_path(const TriangleMesh& mesh, int points) {
   for (std::uint32_t face = 0; face + 1 < mesh.triangles().size(); ++face) {
     const Vec3 from = point_on(mesh, face, Vec3::Constant(1.0 / 3.0));
     const Vec3 to = point_on(mesh, face + 1, Vec3::Constant(1.0 / 3.0));
-    for (int i = 0; i <= points; ++i) path.emplace_back(from + (static_cast<double>(i) / points) * (to - from) - Vec3(0.0, 0.0, 1e-4));
+    for (int i = 0; i <= points; ++i)
+      path.emplace_back(from + (static_cast<double>(i) / points) * (to - from) - Vec3(0.0, 0.0, 1e-4));
   }
   return path;
 }
@@ -52,7 +54,8 @@ void expect_same_as_bare(const MeshSource& source, const std::vector<Vec3>& path
   EXPECT_LE(largest_jump(plain), 1e-9 * plain.front().norm());
   for (const char* law : coated_laws) {
     for (const Mapping mapping : {Mapping::uv, Mapping::per_face, Mapping::triplanar}) {
-      const std::vector<Vec3> forces = slide(scene_of(coated(source, flat_map(0.0), mapping), named(law)), path, outside);
+      const std::vector<Vec3> forces =
+          slide(scene_of(coated(source, flat_map(0.0), mapping), named(law)), path, outside);
       for (std::size_t i = 0; i < path.size(); ++i) {
         ASSERT_LE((forces[i] - plain[i]).norm(), newton_tolerance) << law << " at " << path[i].transpose();
       }
@@ -82,7 +85,8 @@ TEST(H_I, a_coat_of_constant_height_is_the_bare_mesh_so_much_higher) {
     std::vector<Vec3> lifted = path;
     for (Vec3& p : lifted) p.z() += height;
     for (const char* law : {"height-field", "mesostructure"}) {
-      const std::vector<Vec3> forces = slide(scene_of(coated(source, flat_map(height), Mapping::uv), named(law)), lifted, outside);
+      const std::vector<Vec3> forces =
+          slide(scene_of(coated(source, flat_map(height), Mapping::uv), named(law)), lifted, outside);
       for (std::size_t i = 0; i < path.size(); ++i) {
         // Heights are kept as floats: a constant one is exact up to its own rounding.
         ASSERT_LE((forces[i] - plain[i]).norm(), stiffness * 1e-7 * std::abs(height) + newton_tolerance) << law;
@@ -91,13 +95,15 @@ TEST(H_I, a_coat_of_constant_height_is_the_bare_mesh_so_much_higher) {
   }
 }
 
-/// Pokes over the inside of random faces, farther from every edge than the depth and the blend's band reach round the sharpest folds.
+/// Pokes over the inside of random faces, farther from every edge than the depth and the blend's band reach round the
+/// sharpest folds.
 void expect_same_away_from_folds(const MeshSource& source, double depth) {
   constexpr double bands = 3.0 * 0.05;
   const TriangleMesh mesh = mesh_of(source);
   const Scene plain = scene_of(bare(source), GodObjectLaw{});
   std::vector<std::pair<std::string, Scene>> scenes;
-  for (const char* law : coated_laws) scenes.emplace_back(law, scene_of(coated(source, flat_map(0.0), Mapping::uv), named(law)));
+  for (const char* law : coated_laws)
+    scenes.emplace_back(law, scene_of(coated(source, flat_map(0.0), Mapping::uv), named(law)));
   Rng rng(3);
   int checked = 0;
   for (int i = 0; i < 50000 && checked < 300; ++i) {
@@ -118,21 +124,32 @@ void expect_same_away_from_folds(const MeshSource& source, double depth) {
     const Vec3 expected = poke(plain, outside, inside).wrench.force;
     ASSERT_GT(expected.norm(), 0.0);
     for (const auto& [law, scene] : scenes) {
-      ASSERT_LE((poke(scene, outside, inside).wrench.force - expected).norm(), newton_tolerance) << law << " on face " << face;
+      ASSERT_LE((poke(scene, outside, inside).wrench.force - expected).norm(), newton_tolerance)
+          << law << " on face " << face;
     }
   }
   EXPECT_EQ(checked, 300);
 }
 
-TEST(H_I, flat_coat_on_M_b_is_the_bare_mesh_away_from_folds) { expect_same_away_from_folds(trial_mesh_b(), 5e-4); }
-TEST(H_I, flat_coat_on_M_b_with_the_strongest_folds) { expect_same_away_from_folds(trial_mesh_b(std::numbers::pi / 4.0), 5e-4); }
-TEST(H_I, flat_coat_on_M_c_is_the_bare_mesh_away_from_folds) { expect_same_away_from_folds(trial_mesh_c(), 5e-4); }
-TEST(H_I, flat_coat_on_an_icosahedron_is_the_bare_mesh_away_from_folds) { expect_same_away_from_folds(icosphere(0, 0.02), 5e-4); }
+TEST(H_I, flat_coat_on_M_b_is_the_bare_mesh_away_from_folds) {
+  expect_same_away_from_folds(trial_mesh_b(), 5e-4);
+}
+TEST(H_I, flat_coat_on_M_b_with_the_strongest_folds) {
+  expect_same_away_from_folds(trial_mesh_b(std::numbers::pi / 4.0), 5e-4);
+}
+TEST(H_I, flat_coat_on_M_c_is_the_bare_mesh_away_from_folds) {
+  expect_same_away_from_folds(trial_mesh_c(), 5e-4);
+}
+TEST(H_I, flat_coat_on_an_icosahedron_is_the_bare_mesh_away_from_folds) {
+  expect_same_away_from_folds(icosphere(0, 0.02), 5e-4);
+}
 TEST(H_I, flat_coat_on_icospheres_is_the_bare_mesh_away_from_folds) {
   expect_same_away_from_folds(icosphere(1, 0.02), 5e-4);
   expect_same_away_from_folds(icosphere(2, 0.02), 2e-4);
 }
-TEST(H_I, flat_coat_on_a_box_is_the_bare_mesh_away_from_folds) { expect_same_away_from_folds(box_mesh(Vec3(0.04, 0.03, 0.02)), 1e-3); }
+TEST(H_I, flat_coat_on_a_box_is_the_bare_mesh_away_from_folds) {
+  expect_same_away_from_folds(box_mesh(Vec3(0.04, 0.03, 0.02)), 1e-3);
+}
 
 /// A map of amplitude 10 % of the edge on M_a, and where on it a point is, found without the coat.
 struct Relief {
@@ -165,9 +182,9 @@ struct Relief {
 };
 
 struct Trace {
-  double excursion = 0.0;   ///< highest minus lowest of the probe with F/k removed (m)
+  double excursion = 0.0;  ///< highest minus lowest of the probe with F/k removed (m)
   double lowest = infinity;
-  double rms = 0.0;         ///< of the probe with F/k removed against the relief (m)
+  double rms = 0.0;  ///< of the probe with F/k removed against the relief (m)
   int samples = 0;
 };
 
@@ -214,9 +231,15 @@ void expect_followed(MesostructureKind kind, bool leave_out_steps) {
     }
   }
 }
-TEST(H_II, height_field_and_mesostructure_follow_H_2_on_M_a) { expect_followed(MesostructureKind::beams, true); }
-TEST(H_II, height_field_and_mesostructure_follow_H_3_on_M_a) { expect_followed(MesostructureKind::rings, false); }
-TEST(H_II, height_field_and_mesostructure_follow_H_4_on_M_a) { expect_followed(MesostructureKind::warts, false); }
+TEST(H_II, height_field_and_mesostructure_follow_H_2_on_M_a) {
+  expect_followed(MesostructureKind::beams, true);
+}
+TEST(H_II, height_field_and_mesostructure_follow_H_3_on_M_a) {
+  expect_followed(MesostructureKind::rings, false);
+}
+TEST(H_II, height_field_and_mesostructure_follow_H_4_on_M_a) {
+  expect_followed(MesostructureKind::warts, false);
+}
 
 /// The same over the insides of faces of M_d,j, farther than the blend's band from the edges.
 void expect_followed_on_sphere(MesostructureKind kind, int subdivisions, Mapping mapping) {
@@ -296,7 +319,8 @@ Jumps jumps_over_edges(const Law& law, double step) {
   const auto path = line(from, to, static_cast<int>(std::lround((to - from).norm() / step)));
   const std::vector<Vec3> forces = slide(scene, path, from + Vec3(0.0, 0.0, 3e-3));
   Jumps jumps{largest_jump(forces), 0.0};
-  for (std::size_t i = 1; i < forces.size(); ++i) jumps.normal_force = std::max(jumps.normal_force, std::abs(forces[i].z() - forces[i - 1].z()));
+  for (std::size_t i = 1; i < forces.size(); ++i)
+    jumps.normal_force = std::max(jumps.normal_force, std::abs(forces[i].z() - forces[i - 1].z()));
   return jumps;
 }
 
@@ -315,7 +339,8 @@ TEST(H_edge, with_the_s_shape_halving_the_step_halves_the_change_of_force) {
 }
 
 TEST(H_edge, with_the_linear_blend_halving_the_step_halves_the_change_of_height) {
-  // The weight has kinks at the band's borders, so its gradient, and with it the lateral force of the potential, steps there.
+  // The weight has kinks at the band's borders, so its gradient, and with it the lateral force of the potential, steps
+  // there.
   const MesostructureLaw law{Formulation::consistent, 0.05, Blend::linear, {}};
   const double ratio = jumps_over_edges(law, 2e-6).normal_force / jumps_over_edges(law, 1e-6).normal_force;
   EXPECT_GT(ratio, 1.6);

@@ -42,7 +42,8 @@ TEST(SceneErrors, each_law_that_needs_a_coat_is_refused_on_a_bare_mesh) {
     EXPECT_NE(error.what.find(law), std::string::npos);
     EXPECT_NE(error.what.find("plate"), std::string::npos);
   }
-  for (const char* law : {"god-object", "force-shading"}) EXPECT_TRUE(Scene::build({good(named(law), false)}, 0.0).ok());
+  for (const char* law : {"god-object", "force-shading"})
+    EXPECT_TRUE(Scene::build({good(named(law), false)}, 0.0).ok());
 }
 
 TEST(SceneErrors, each_law_that_touches_with_a_point_is_refused_with_a_radius) {
@@ -66,11 +67,14 @@ TEST(SceneErrors, each_bad_material_value_is_named) {
 }
 
 TEST(SceneErrors, each_bad_law_option_is_named) {
-  expect_named(refused(good(HeightFieldLaw{Formulation::literal, 0.5})), ErrorCode::bad_value, "surfaces[1].law.edge_taper");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.0, Blend::linear, {}})), ErrorCode::bad_value, "surfaces[1].law.rho");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {}})), ErrorCode::bad_value, "surfaces[1].law.blend_map");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {0.0, 2.0}})), ErrorCode::bad_value,
+  expect_named(refused(good(HeightFieldLaw{Formulation::literal, 0.5})), ErrorCode::bad_value,
+               "surfaces[1].law.edge_taper");
+  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.0, Blend::linear, {}})), ErrorCode::bad_value,
+               "surfaces[1].law.rho");
+  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {}})), ErrorCode::bad_value,
                "surfaces[1].law.blend_map");
+  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {0.0, 2.0}})),
+               ErrorCode::bad_value, "surfaces[1].law.blend_map");
 }
 
 TEST(SceneErrors, each_bad_pose_is_named) {

@@ -12,7 +12,8 @@ namespace {
 using namespace test;
 
 /// Slope of the height along `direction` in the face's plane by central differences.
-double finite_slope(const Coat& coat, const TriangleMesh& mesh, std::uint32_t face, const Vec3& point, const Vec3& direction, double h) {
+double finite_slope(const Coat& coat, const TriangleMesh& mesh, std::uint32_t face, const Vec3& point,
+                    const Vec3& direction, double h) {
   const BarycentricFrame frame = barycentric_frame(mesh, face);
   const double ahead = coat.sample(mesh, face, frame.coordinates(point + h * direction)).height;
   const double behind = coat.sample(mesh, face, frame.coordinates(point - h * direction)).height;
@@ -71,7 +72,8 @@ std::pair<double, int> largest_edge_step(const TriangleMesh& mesh, const Coat& c
         barycentric[edge] = 1.0 - along;
         barycentric[(edge + 1) % 3] = along;
         const Vec3 across = barycentric_frame(mesh, other).coordinates(point_on(mesh, face, barycentric));
-        largest = std::max(largest, std::abs(coat.sample(mesh, face, barycentric).height - coat.sample(mesh, other, across).height));
+        largest = std::max(
+            largest, std::abs(coat.sample(mesh, face, barycentric).height - coat.sample(mesh, other, across).height));
       }
     }
   }
@@ -79,7 +81,8 @@ std::pair<double, int> largest_edge_step(const TriangleMesh& mesh, const Coat& c
 }
 
 TEST(CoatContinuity, triplanar_is_continuous_over_every_edge_even_with_a_map_that_does_not_fit) {
-  for (const MeshSource& source : {icosphere(1, 0.02), box_mesh(Vec3(0.03, 0.02, 0.01)), random_closed_mesh(3, 2, 0.02, 0.4)}) {
+  for (const MeshSource& source :
+       {icosphere(1, 0.02), box_mesh(Vec3(0.03, 0.02, 0.01)), random_closed_mesh(3, 2, 0.02, 0.4)}) {
     const TriangleMesh mesh = mesh_of(source);
     const auto [step, edges] = largest_edge_step(mesh, coat_on(mesh, wavy_map(1e-3), Mapping::triplanar, 0.0137));
     EXPECT_GT(edges, 20);
@@ -108,7 +111,9 @@ TEST(CoatContinuity, a_uv_seam_does_not_break_adjacency) {
       ASSERT_NE(other, no_index);
       const std::uint32_t vertex = mesh.triangles()[face][static_cast<std::size_t>(edge)];
       for (std::size_t i = 0; i < 3; ++i) {
-        if (mesh.triangles()[other][i] == vertex && mesh.uvs(other)[i] != mesh.uvs(face)[static_cast<std::size_t>(edge)]) ++seams;
+        if (mesh.triangles()[other][i] == vertex &&
+            mesh.uvs(other)[i] != mesh.uvs(face)[static_cast<std::size_t>(edge)])
+          ++seams;
       }
     }
   }
@@ -149,14 +154,16 @@ TEST(Coat, triplanar_on_an_axis_aligned_plane_is_the_projected_map) {
   const Coat coat = coat_on(mesh, map, Mapping::triplanar, 0.008);
   const Vec3 barycentric(0.2, 0.3, 0.5);
   const Vec3 point = point_on(mesh, 9, barycentric);
-  EXPECT_NEAR(coat.sample(mesh, 9, barycentric).height, map.sample(Vec2(point.x() / 0.008, point.y() / 0.008)).height, 1e-15);
+  EXPECT_NEAR(coat.sample(mesh, 9, barycentric).height, map.sample(Vec2(point.x() / 0.008, point.y() / 0.008)).height,
+              1e-15);
 }
 
 /// A picture of one direction, as a normal map stores it.
 NormalMap leaning_normals(const Vec3& normal) {
   Image image{2, 2, 3, 16, {}};
   for (int pixel = 0; pixel < 4; ++pixel) {
-    for (int c = 0; c < 3; ++c) image.samples.push_back(static_cast<std::uint16_t>(std::lround(32768.0 + 32767.0 * normal[c])));
+    for (int c = 0; c < 3; ++c)
+      image.samples.push_back(static_cast<std::uint16_t>(std::lround(32768.0 + 32767.0 * normal[c])));
   }
   return must(NormalMap::build(image, {}));
 }
@@ -164,7 +171,8 @@ NormalMap leaning_normals(const Vec3& normal) {
 TEST(Coat, a_given_normal_map_leans_along_the_maps_own_axes) {
   const Vec3 lean = Vec3(0.3, -0.2, 1.0).normalized();
   const TriangleMesh mesh = mesh_of(plane_grid(0.02, 0.02, 2, 2));
-  const auto maps = std::make_shared<const Mesostructure>(must(Mesostructure::build(flat_map(0.0), leaning_normals(lean), Vec2(0.02, 0.02))));
+  const auto maps = std::make_shared<const Mesostructure>(
+      must(Mesostructure::build(flat_map(0.0), leaning_normals(lean), Vec2(0.02, 0.02))));
   for (const Mapping mapping : {Mapping::uv, Mapping::triplanar}) {
     const Coat coat = must(Coat::build(mesh, maps, CoatSettings{mapping, Vec2::Ones()}));
     const CoatSample sample = coat.sample(mesh, 3, Vec3(0.2, 0.3, 0.5));

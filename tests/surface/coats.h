@@ -33,7 +33,8 @@ inline TriangleMesh mesh_of(MeshSource source, double scale = 1.0) {
 
 /// A map of size x size texels from a formula of the texture coordinates, in metres.
 template <class F>
-HeightMap map_of(int size, F&& height, Wrap wrap = Wrap::repeat, Reconstruction how = Reconstruction::quadratic_bspline) {
+HeightMap map_of(int size, F&& height, Wrap wrap = Wrap::repeat,
+                 Reconstruction how = Reconstruction::quadratic_bspline) {
   std::vector<float> heights;
   for (int row = 0; row < size; ++row) {
     for (int column = 0; column < size; ++column) {
@@ -53,7 +54,8 @@ inline HeightMap wavy_map(double amplitude, int size = 32, Reconstruction how = 
       size,
       [&](double s, double t) {
         const double turn = 2.0 * std::numbers::pi;
-        return amplitude * (0.5 * std::sin(turn * s) + 0.3 * std::cos(turn * (s + 2.0 * t)) + 0.2 * std::sin(turn * 2.0 * t));
+        return amplitude *
+               (0.5 * std::sin(turn * s) + 0.3 * std::cos(turn * (s + 2.0 * t)) + 0.2 * std::sin(turn * 2.0 * t));
       },
       Wrap::repeat, how);
 }
@@ -70,13 +72,16 @@ inline std::shared_ptr<const MeshSurface> bare(MeshSource source, double scale =
   return std::make_shared<const MeshSurface>(TriangleIndex::build(mesh_of(std::move(source), scale)));
 }
 
-inline std::shared_ptr<const ReliefSurface> coated(MeshSource source, HeightMap map, Mapping mapping, double tile = 0.01, double scale = 1.0) {
+inline std::shared_ptr<const ReliefSurface> coated(MeshSource source, HeightMap map, Mapping mapping,
+                                                   double tile = 0.01, double scale = 1.0) {
   TriangleMesh mesh = mesh_of(std::move(source), scale);
   Coat coat = coat_on(mesh, std::move(map), mapping, tile);
   return std::make_shared<const ReliefSurface>(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat));
 }
 
-inline Vec3 random_vector(Rng& rng, double size) { return {rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)}; }
+inline Vec3 random_vector(Rng& rng, double size) {
+  return {rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)};
+}
 
 inline Vec3 random_direction(Rng& rng) {
   for (;;) {

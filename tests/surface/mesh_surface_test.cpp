@@ -36,7 +36,9 @@ TEST(MeshSurfaceEval, gradient_agrees_with_finite_differences) {
     const double h = 1e-8;
     Vec3 expected;
     for (int k = 0; k < 3; ++k) {
-      expected[k] = (surface->eval(p + h * Vec3::Unit(k), hint).value - surface->eval(p - h * Vec3::Unit(k), hint).value) / (2.0 * h);
+      expected[k] =
+          (surface->eval(p + h * Vec3::Unit(k), hint).value - surface->eval(p - h * Vec3::Unit(k), hint).value) /
+          (2.0 * h);
     }
     // The medial axis has measure zero; there the two sides of the difference see different feet.
     if (std::abs(expected.norm() - 1.0) > 1e-4) continue;
@@ -66,7 +68,8 @@ TEST(Pseudonormal, tells_inside_from_outside_at_edges_and_corners_where_face_nor
       Vec3 barycentric = Vec3::Constant(0.5);
       barycentric[k] = 0.0;
       const std::uint32_t other = mesh.neighbour(face, (k + 1) % 3);
-      EXPECT_LT((pseudonormal(mesh, face, barycentric) - mesh.face_normal(face) - mesh.face_normal(other)).norm(), 1e-15);
+      EXPECT_LT((pseudonormal(mesh, face, barycentric) - mesh.face_normal(face) - mesh.face_normal(other)).norm(),
+                1e-15);
     }
     EXPECT_EQ(pseudonormal(mesh, face, random_barycentric(rng, 0.01)), mesh.face_normal(face));
   }
@@ -81,7 +84,8 @@ TEST(InterpolatedNormal, is_unit_and_the_vertex_normal_at_corners) {
     EXPECT_NEAR(interpolated_normal(mesh, face, barycentric).norm(), 1.0, 1e-12);
     // On a sphere it points away from the centre.
     EXPECT_GT(interpolated_normal(mesh, face, barycentric).dot(point_on(mesh, face, barycentric).normalized()), 0.99);
-    EXPECT_LT((interpolated_normal(mesh, face, Vec3::UnitX()) - mesh.vertex_normal(mesh.triangles()[face][0])).norm(), 1e-6);
+    EXPECT_LT((interpolated_normal(mesh, face, Vec3::UnitX()) - mesh.vertex_normal(mesh.triangles()[face][0])).norm(),
+              1e-6);
   }
 }
 

@@ -18,7 +18,8 @@ int prisms_that_contain(const TriangleMesh& mesh, const Prisms& prisms, const Ve
 /// A point of the shell: the extruded face at this height.
 Vec3 shell_point(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric, double height) {
   Vec3 point = point_on(mesh, face, barycentric);
-  for (std::size_t i = 0; i < 3; ++i) point += height * barycentric[static_cast<int>(i)] * mesh.vertex_normal(mesh.triangles()[face][i]);
+  for (std::size_t i = 0; i < 3; ++i)
+    point += height * barycentric[static_cast<int>(i)] * mesh.vertex_normal(mesh.triangles()[face][i]);
   return point;
 }
 
@@ -29,7 +30,8 @@ TEST(Prisms, every_point_of_a_closed_meshs_shell_lies_in_exactly_one) {
     const Prisms prisms(mesh, half);
     Rng rng(17);
     for (int i = 0; i < 4000; ++i) {
-      const Vec3 p = shell_point(mesh, random_face(rng, mesh), random_barycentric(rng), rng.uniform(-0.98, 0.98) * half);
+      const Vec3 p =
+          shell_point(mesh, random_face(rng, mesh), random_barycentric(rng), rng.uniform(-0.98, 0.98) * half);
       ASSERT_EQ(prisms_that_contain(mesh, prisms, p), 1) << "point " << i;
     }
   }

@@ -65,7 +65,8 @@ TEST(ReliefSegment, front_alone_is_touched_from_outside_only) {
   const SweptHit left = relief->segment(up, 0.0, Sides::both, hint);
   ASSERT_TRUE(left.hit);
   EXPECT_NEAR(left.t, 2.5 / 4.0, 5e-6);
-  EXPECT_LT((left.contact.normal + Vec3::UnitZ()).norm(), 1e-9) << "the side that is touched faces where the motion came from";
+  EXPECT_LT((left.contact.normal + Vec3::UnitZ()).norm(), 1e-9)
+      << "the side that is touched faces where the motion came from";
 }
 
 TEST(ReliefSegment, a_ball_stops_one_radius_above_a_flat_coat) {
@@ -101,7 +102,8 @@ TEST(ReliefEval, gradient_agrees_with_finite_differences) {
     expect_gradient(*plane, random_vector(rng, 0.4 * side), checked);
     const TriangleMesh& mesh = ball->base().mesh();
     const std::uint32_t face = random_face(rng, mesh);
-    const Vec3 over = point_on(mesh, face, random_barycentric(rng, 0.1)) + rng.uniform(-3e-4, 3e-4) * mesh.face_normal(face);
+    const Vec3 over =
+        point_on(mesh, face, random_barycentric(rng, 0.1)) + rng.uniform(-3e-4, 3e-4) * mesh.face_normal(face);
     expect_gradient(*ball, over, checked);
   }
   EXPECT_GT(checked, 900);
@@ -178,7 +180,8 @@ TEST(ReliefSurfaceTest, bounds_hold_the_relief) {
   for (int i = 0; i < 2000; ++i) {
     const std::uint32_t face = random_face(rng, mesh);
     const Vec3 barycentric = random_barycentric(rng);
-    const Vec3 p = point_on(mesh, face, barycentric) + relief->coat().sample(mesh, face, barycentric).height * mesh.face_normal(face);
+    const Vec3 p = point_on(mesh, face, barycentric) +
+                   relief->coat().sample(mesh, face, barycentric).height * mesh.face_normal(face);
     ASSERT_TRUE((p.array() >= bounds.lower.array()).all() && (p.array() <= bounds.upper.array()).all());
   }
   EXPECT_EQ(relief->prisms().half_height(), relief->coat().amplitude_bound());
