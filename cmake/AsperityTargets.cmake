@@ -57,5 +57,7 @@ function(asperity_test name)
   target_link_libraries(asperity_${name}_tests PRIVATE ${arg_LIBRARIES} GTest::gtest_main asperity_build_settings)
   target_compile_definitions(asperity_${name}_tests PRIVATE
     ASPERITY_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ASPERITY_SHARED_DATA="${PROJECT_SOURCE_DIR}/../shared/data")
-  gtest_discover_tests(asperity_${name}_tests DISCOVERY_MODE PRE_TEST PROPERTIES LABELS ${name} TIMEOUT 600)
+  gtest_discover_tests(asperity_${name}_tests DISCOVERY_MODE PRE_TEST PROPERTIES LABELS ${name} TIMEOUT 600
+    # The same random cases every time; for new ones run the program itself, or set RC_PARAMS.
+    ENVIRONMENT "RC_PARAMS=seed=20261121")
 endfunction()

@@ -138,8 +138,10 @@ Status write_outputs(const Experiment& experiment, const RunResult& run, const R
   if (!options.no_report) {
     ASPERITY_CHECK(write_run_report(folder / "report.html", report));
     files["report"] = (folder / "report.html").string();
-    ASPERITY_CHECK(write_file_atomically(folder / "picture.png", report.picture.png));
-    files["picture"] = (folder / "picture.png").string();
+    if (report.picture) {
+      ASPERITY_CHECK(write_file_atomically(folder / "picture.png", report.picture->png));
+      files["picture"] = (folder / "picture.png").string();
+    }
   }
   const std::string numbers =
       run_json(experiment, run, report, files).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

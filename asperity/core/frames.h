@@ -15,17 +15,13 @@ namespace asperity {
 
 /// Rigid placement of one frame in another.
 struct Pose {
-  Vec3 position = Vec3::Zero();           ///< m
-  Quat orientation = Quat::Identity();    ///< unit quaternion
+  Vec3 position = Vec3::Zero();         ///< m
+  Quat orientation = Quat::Identity();  ///< unit quaternion
 
   [[nodiscard]] Vec3 apply(const Vec3& point) const { return orientation * point + position; }
-  [[nodiscard]] Vec3 apply_inverse(const Vec3& point) const {
-    return orientation.conjugate() * (point - position);
-  }
+  [[nodiscard]] Vec3 apply_inverse(const Vec3& point) const { return orientation.conjugate() * (point - position); }
   [[nodiscard]] Vec3 rotate(const Vec3& direction) const { return orientation * direction; }
-  [[nodiscard]] Vec3 rotate_inverse(const Vec3& direction) const {
-    return orientation.conjugate() * direction;
-  }
+  [[nodiscard]] Vec3 rotate_inverse(const Vec3& direction) const { return orientation.conjugate() * direction; }
   [[nodiscard]] bool is_identity() const {
     return position.isZero(0.0) && orientation.w() == 1.0 && orientation.vec().isZero(0.0);
   }

@@ -45,9 +45,7 @@ struct Box {
   /// Length of the diagonal (m); 0 for an empty box.
   [[nodiscard]] double diagonal() const { return empty() ? 0.0 : extent().norm(); }
   /// The box grown by `margin` (m) on every side.
-  [[nodiscard]] Box grown(double margin) const {
-    return {lower.array() - margin, upper.array() + margin};
-  }
+  [[nodiscard]] Box grown(double margin) const { return {lower.array() - margin, upper.array() + margin}; }
 };
 
 }  // namespace asperity

@@ -9,20 +9,20 @@
 namespace asperity {
 
 enum class ErrorCode {
-  file_missing,       ///< no such file, or not readable
-  file_empty,         ///< nothing in it
-  file_truncated,     ///< ends before what its header or syntax promises
-  file_malformed,     ///< not the format it claims to be
-  file_unsupported,   ///< a format, or a variant of one, that is not read
-  file_unwritable,    ///< cannot be created or written
-  bad_key,            ///< a key nobody reads
-  bad_type,           ///< right key, wrong JSON type
-  bad_value,          ///< out of range, not finite, unknown name
-  bad_mesh,           ///< geometry that cannot be touched
-  bad_map,            ///< an image that cannot be a height or normal map
-  unsupported_pair,   ///< this law cannot be used on this surface
-  too_large,          ///< would exceed a stated memory or size bound
-  mismatch,           ///< two inputs do not belong together (trace and scene, map sizes)
+  file_missing,      ///< no such file, or not readable
+  file_empty,        ///< nothing in it
+  file_truncated,    ///< ends before what its header or syntax promises
+  file_malformed,    ///< not the format it claims to be
+  file_unsupported,  ///< a format, or a variant of one, that is not read
+  file_unwritable,   ///< cannot be created or written
+  bad_key,           ///< a key nobody reads
+  bad_type,          ///< right key, wrong JSON type
+  bad_value,         ///< out of range, not finite, unknown name
+  bad_mesh,          ///< geometry that cannot be touched
+  bad_map,           ///< an image that cannot be a height or normal map
+  unsupported_pair,  ///< this law cannot be used on this surface
+  too_large,         ///< would exceed a stated memory or size bound
+  mismatch,          ///< two inputs do not belong together (trace and scene, map sizes)
 };
 
 /// Stable name of the cause, used in messages and `--json` ("bad_value").
@@ -51,7 +51,7 @@ struct Error {
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}  // NOLINT: implicit by design
+  Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}      // NOLINT: implicit by design
   Result(Error error) : content_(std::in_place_index<1>, std::move(error)) {}  // NOLINT
 
   [[nodiscard]] bool ok() const { return content_.index() == 0; }
@@ -76,7 +76,9 @@ class [[nodiscard]] Result {
 
 /// Success without a value, or an Error.
 using Status = Result<std::monostate>;
-inline Status success() { return Status(std::monostate{}); }
+inline Status success() {
+  return Status(std::monostate{});
+}
 
 }  // namespace asperity
 
@@ -88,8 +90,8 @@ inline Status success() { return Status(std::monostate{}); }
   if (!name) return std::move(name).error();              \
   declaration = std::move(name).value()
 /// The same for a Status.
-#define ASPERITY_CHECK(expression)                                        \
-  do {                                                                    \
+#define ASPERITY_CHECK(expression)                                                \
+  do {                                                                            \
     if (auto status_ = (expression); !status_) return std::move(status_).error(); \
   } while (false)
 #define ASPERITY_CONCAT_(a, b) ASPERITY_CONCAT_INNER_(a, b)

@@ -18,14 +18,15 @@ struct ProbeSample {
 
 /// Status of one tick. Bits, because several can hold at once.
 enum class TickFlag : std::uint32_t {
-  contact = 1u << 0,           ///< a surface pushes on the probe
-  not_converged = 1u << 1,     ///< the constraint solve used its whole budget; the proxy is feasible, not yet optimal
-  started_inside = 1u << 2,    ///< the probe began inside an object and has not left it yet; force withheld
-  input_not_finite = 1u << 3,  ///< the probe sample held a NaN or an infinity; the last force was not continued
-  force_limited = 1u << 4,     ///< the safety stage clamped the magnitude
-  slew_limited = 1u << 5,      ///< the safety stage limited the change per second
+  contact = 1u << 0,            ///< a surface pushes on the probe
+  not_converged = 1u << 1,      ///< the constraint solve used its whole budget; the proxy is feasible, not yet optimal
+  started_inside = 1u << 2,     ///< the probe began inside an object and has not left it yet; force withheld
+  input_not_finite = 1u << 3,   ///< the probe sample held a NaN or an infinity; the last force was not continued
+  force_limited = 1u << 4,      ///< the safety stage clamped the magnitude
+  slew_limited = 1u << 5,       ///< the safety stage limited the change per second
   output_not_finite = 1u << 6,  ///< the safety stage replaced a force that was not finite by zero
-  contacts_dropped = 1u << 7,   ///< more instances within reach than a probe can hold at once; the farther ones are not felt
+  contacts_dropped =
+      1u << 7,  ///< more instances within reach than a probe can hold at once; the farther ones are not felt
 };
 
 /// A set of TickFlag.
@@ -51,13 +52,13 @@ class Flags {
 
 /// What is touched, in brief. Fields that a law does not know are left at their defaults.
 struct ContactSummary {
-  std::uint32_t count = 0;             ///< constraints or patches that push
-  std::uint32_t instance = no_index;   ///< of the strongest one
-  std::uint32_t element = no_index;    ///< face, cell or patch of that instance
-  Vec3 point = Vec3::Zero();           ///< on the surface (m, world)
-  Vec3 normal = Vec3::Zero();          ///< unit, outward from what is touched (world); zero without contact
-  double penetration = 0.0;            ///< m, along `normal`
-  double height = 0.0;                 ///< relief height under the probe (m); 0 without a coat
+  std::uint32_t count = 0;            ///< constraints or patches that push
+  std::uint32_t instance = no_index;  ///< of the strongest one
+  std::uint32_t element = no_index;   ///< face, cell or patch of that instance
+  Vec3 point = Vec3::Zero();          ///< on the surface (m, world)
+  Vec3 normal = Vec3::Zero();         ///< unit, outward from what is touched (world); zero without contact
+  double penetration = 0.0;           ///< m, along `normal`
+  double height = 0.0;                ///< relief height under the probe (m); 0 without a coat
 };
 
 /// What the hand should feel. World frame, SI.

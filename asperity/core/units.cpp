@@ -16,10 +16,12 @@ struct Unit {
 };
 
 const std::vector<Unit>& units_of(Dimension dimension) {
-  static const std::vector<Unit> length{{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}, {"µm", 1e-6}, {"nm", 1e-9}, {"in", 0.0254}};
+  static const std::vector<Unit> length{{"m", 1.0},   {"cm", 1e-2}, {"mm", 1e-3},  {"um", 1e-6},
+                                        {"µm", 1e-6}, {"nm", 1e-9}, {"in", 0.0254}};
   static const std::vector<Unit> force{{"N", 1.0}, {"mN", 1e-3}};
   static const std::vector<Unit> stiffness{{"N/m", 1.0}, {"N/mm", 1e3}};
-  static const std::vector<Unit> damping{{"N s/m", 1.0}, {"Ns/m", 1.0}, {"N·s/m", 1.0}, {"N s/mm", 1e3}, {"Ns/mm", 1e3}};
+  static const std::vector<Unit> damping{
+      {"N s/m", 1.0}, {"Ns/m", 1.0}, {"N·s/m", 1.0}, {"N s/mm", 1e3}, {"Ns/mm", 1e3}};
   static const std::vector<Unit> mass{{"kg", 1.0}, {"g", 1e-3}};
   static const std::vector<Unit> time{{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"µs", 1e-6}};
   static const std::vector<Unit> frequency{{"Hz", 1.0}, {"kHz", 1e3}};
@@ -62,7 +64,10 @@ std::string accepted_units(Dimension dimension) {
 Result<double> parse_quantity(std::string_view text, Dimension dimension) {
   const std::string_view whole = trimmed(text);
   const auto fail = [&](std::string what) {
-    return Error{ErrorCode::bad_value, fmt::format("\"{}\" {}", whole, what), {}, {},
+    return Error{ErrorCode::bad_value,
+                 fmt::format("\"{}\" {}", whole, what),
+                 {},
+                 {},
                  "a number, SI or with one of the units " + accepted_units(dimension)};
   };
   double value = 0.0;

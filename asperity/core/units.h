@@ -12,10 +12,16 @@ namespace asperity {
 /// A duration or a time since the start of a run (s). A type of its own, so that no rate is ever implied.
 using Seconds = std::chrono::duration<double>;
 
-constexpr double millimetres(double value) { return value * 1e-3; }
-constexpr double micrometres(double value) { return value * 1e-6; }
+constexpr double millimetres(double value) {
+  return value * 1e-3;
+}
+constexpr double micrometres(double value) {
+  return value * 1e-6;
+}
 /// Newton per millimetre to N/m, the unit the field speaks for stiffness.
-constexpr double newtons_per_millimetre(double value) { return value * 1e3; }
+constexpr double newtons_per_millimetre(double value) {
+  return value * 1e3;
+}
 
 enum class Dimension { length, force, stiffness, damping, mass, time, frequency, speed, ratio, angle };
 

@@ -398,7 +398,8 @@ StrokeSettings default_stroke(const Box& bounds) {
   }
   const int first = (across + 1) % 3;
   const int second = (across + 2) % 3;
-  const int along = extent[std::min(first, second)] >= extent[std::max(first, second)] ? std::min(first, second) : std::max(first, second);
+  const int along = extent[std::min(first, second)] >= extent[std::max(first, second)] ? std::min(first, second)
+                                                                                       : std::max(first, second);
   Vec3 middle = bounds.centre();
   middle[across] = bounds.upper[across];
   settings.start = middle;

@@ -144,9 +144,9 @@ class StrokePath {
 /// than 2 million samples, a projection that is not finite). [build]
 Result<StrokePath> build_stroke(const StrokeSettings& settings, const SurfaceProjector& project);
 
-/// A stroke that suits an object of these bounds when nobody asked for another: a line over the side that shows most of it
-/// (across its shortest extent, towards +; the top, y, where extents are alike), through the middle, over 40 % of that side's
-/// longer edge, in about four seconds; approach and lift from 5 % of the object's diagonal. [any]
+/// A stroke that suits an object of these bounds when nobody asked for another: a line over the side that shows most of
+/// it (across its shortest extent, towards +; the top, y, where extents are alike), through the middle, over 40 % of
+/// that side's longer edge, in about four seconds; approach and lift from 5 % of the object's diagonal. [any]
 StrokeSettings default_stroke(const Box& bounds);
 
 }  // namespace asperity

@@ -287,7 +287,8 @@ ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
         if (found.distance[i] > limit || leaf.face[i] == no_index) continue;
         const auto corners = mesh_->corners(leaf.face[i]);
         const TrianglePoint point = closest_point_on_triangle(p, corners[0], corners[1], corners[2]);
-        if (point.squared_distance > best_squared || (point.squared_distance == best_squared && best.face != no_index)) continue;
+        if (point.squared_distance > best_squared || (point.squared_distance == best_squared && best.face != no_index))
+          continue;
         best_squared = point.squared_distance;
         best = {leaf.face[i], point};
         limit = static_cast<float>(std::sqrt(best_squared) * per_scale_) * 1.000001F + error;

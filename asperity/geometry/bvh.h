@@ -17,9 +17,9 @@ struct BvhSettings {
 };
 
 /// Bounding-volume hierarchy, eight wide, binned by surface area (Wald 2007); leaves hold up to eight triangles in
-/// single precision relative to the object's centre and size. Single precision only discards, with a bound on its rounding; every
-/// answer is decided in double precision on the mesh's own vertices, so it equals brute force.
-/// Queries are const, allocation-free and safe from any thread. The mesh must outlive the hierarchy.
+/// single precision relative to the object's centre and size. Single precision only discards, with a bound on its
+/// rounding; every answer is decided in double precision on the mesh's own vertices, so it equals brute force. Queries
+/// are const, allocation-free and safe from any thread. The mesh must outlive the hierarchy.
 class Bvh {
  public:
   /// About 0.5 s for 1.3 M triangles. [build]
@@ -29,13 +29,13 @@ class Bvh {
   [[nodiscard]] ClosestHit closest(const Vec3& p, double bound) const noexcept;
   /// First triangle met by the segment, from either side. [servo]
   [[nodiscard]] FirstHit first_hit(const Segment& segment) const noexcept;
-  /// Fills `patch` around `centre` with every leaf nearer than `reach` (m), or with the nearest ones if they do not fit,
-  /// and certifies how far the list is complete. [servo]
+  /// Fills `patch` around `centre` with every leaf nearer than `reach` (m), or with the nearest ones if they do not
+  /// fit, and certifies how far the list is complete. [servo]
   void gather(const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) const noexcept;
 
-  /// Calls visit(face, distance, offset) for every triangle that comes within `reach` (m) of `p`, and perhaps for some that
-  /// come a rounding less near; distance and offset (from the triangle to p) in metres, single precision, `error()` of it
-  /// off at most. From the patch alone, which must cover the ball. [servo]
+  /// Calls visit(face, distance, offset) for every triangle that comes within `reach` (m) of `p`, and perhaps for some
+  /// that come a rounding less near; distance and offset (from the triangle to p) in metres, single precision,
+  /// `error()` of it off at most. From the patch alone, which must cover the ball. [servo]
   template <class Visit>
   void scan(const TrianglePatch& patch, const Vec3& p, double reach, Visit&& visit) const noexcept;
   /// The same from the whole tree. [servo]
@@ -51,8 +51,8 @@ class Bvh {
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const;
-  /// Calls visit(face, t_entry) for triangles in leaves that the segment, grown by `radius`, passes, nearest leaf first,
-  /// until visit answers a t (0 … 1) below the entry of all that remain. [servo]
+  /// Calls visit(face, t_entry) for triangles in leaves that the segment, grown by `radius`, passes, nearest leaf
+  /// first, until visit answers a t (0 … 1) below the entry of all that remain. [servo]
   template <class Visit>
   void for_each_along(const Segment& segment, double radius, Visit&& visit) const;
 
@@ -114,7 +114,8 @@ inline float Bvh::rounding(const float local[3]) noexcept {
 }
 
 inline bool Bvh::reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept {
-  const Eigen::Vector3f offset(local[0] - cylinder.centre[0], local[1] - cylinder.centre[1], local[2] - cylinder.centre[2]);
+  const Eigen::Vector3f offset(local[0] - cylinder.centre[0], local[1] - cylinder.centre[1],
+                               local[2] - cylinder.centre[2]);
   const Eigen::Vector3f axis(cylinder.axis[0], cylinder.axis[1], cylinder.axis[2]);
   const float along = offset.dot(axis);
   const float beyond = std::max(0.0F, (offset - along * axis).norm() - cylinder.radius);

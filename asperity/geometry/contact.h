@@ -21,8 +21,8 @@ struct Foot {
 /// First touch of a moving ball (or point: radius 0).
 struct SweptHit {
   bool hit = false;
-  double t = 1.0;         ///< fraction of the motion at which it happens
-  Foot contact;   ///< valid when hit
+  double t = 1.0;  ///< fraction of the motion at which it happens
+  Foot contact;    ///< valid when hit
 };
 
 /// More planes than three are never active at once; the others are kept until the solve has chosen.

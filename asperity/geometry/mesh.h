@@ -13,10 +13,10 @@ namespace asperity {
 
 /// A mesh as a file or a generator gives it: nothing is checked yet.
 struct MeshSource {
-  std::vector<Vec3> positions;                             ///< in the file's unit
-  std::vector<std::array<std::uint32_t, 3>> triangles;     ///< indices into `positions`
-  std::vector<std::array<Vec2f, 3>> corner_uvs;            ///< per triangle; empty: the mesh has no UVs
-  std::vector<std::string> notes;                          ///< what the reader repaired or left out, for `inspect`
+  std::vector<Vec3> positions;                          ///< in the file's unit
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into `positions`
+  std::vector<std::array<Vec2f, 3>> corner_uvs;         ///< per triangle; empty: the mesh has no UVs
+  std::vector<std::string> notes;                       ///< what the reader repaired or left out, for `inspect`
 };
 
 /// What is true of a mesh. Counts are of the welded, cleaned mesh unless they say "dropped".
@@ -43,8 +43,8 @@ struct MeshReport {
 
 /// How a source becomes a mesh.
 struct MeshBuildSettings {
-  double scale = 1.0;              ///< multiplies positions: the file's unit in metres
-  bool orient_outward = true;      ///< flip a closed, oriented mesh whose volume is negative
+  double scale = 1.0;          ///< multiplies positions: the file's unit in metres
+  bool orient_outward = true;  ///< flip a closed, oriented mesh whose volume is negative
 };
 
 /// Immutable triangle mesh: welded positions (m, object frame), corner UVs, vertex adjacency.
@@ -71,7 +71,9 @@ class TriangleMesh {
   /// Unit face normal, computed from the corners (right-hand rule). [servo]
   [[nodiscard]] Vec3 face_normal(std::uint32_t face) const noexcept;
   /// Unit vertex normal, weighted by the angles of the incident triangles. [servo]
-  [[nodiscard]] Vec3 vertex_normal(std::uint32_t vertex) const noexcept { return vertex_normals_[vertex].cast<double>(); }
+  [[nodiscard]] Vec3 vertex_normal(std::uint32_t vertex) const noexcept {
+    return vertex_normals_[vertex].cast<double>();
+  }
   /// Triangles that have `vertex` as a corner, ascending. [servo]
   [[nodiscard]] std::span<const std::uint32_t> faces_of_vertex(std::uint32_t vertex) const noexcept {
     return {vertex_faces_.data() + vertex_offsets_[vertex], vertex_faces_.data() + vertex_offsets_[vertex + 1]};

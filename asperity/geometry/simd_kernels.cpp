@@ -147,8 +147,7 @@ ASPERITY_AVX2 unsigned avx2_ray(const BoxesOf8& boxes, const float origin[3], co
     leave = _mm256_min_ps(leave, _mm256_max_ps(a, b));
   }
   _mm256_storeu_ps(entry, enter);
-  const __m256 used =
-      _mm256_cmp_ps(_mm256_load_ps(boxes.lower[0]), _mm256_load_ps(boxes.upper[0]), _CMP_LE_OQ);
+  const __m256 used = _mm256_cmp_ps(_mm256_load_ps(boxes.lower[0]), _mm256_load_ps(boxes.upper[0]), _CMP_LE_OQ);
   const __m256 met = _mm256_and_ps(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ), used);
   return static_cast<unsigned>(_mm256_movemask_ps(met));
 }
@@ -175,8 +174,8 @@ ASPERITY_AVX2 inline Vector8 select8(const Vector8& a, const Vector8& b, __m256 
 }
 ASPERITY_AVX2 inline Vector8 from_edge8(const Vector8& p, const Vector8& e) noexcept {
   const __m256 length = _mm256_add_ps(dot8(e, e), _mm256_set1_ps(tiny));
-  const __m256 t = _mm256_min_ps(_mm256_max_ps(_mm256_div_ps(dot8(p, e), length), _mm256_setzero_ps()),
-                                 _mm256_set1_ps(1.0F));
+  const __m256 t =
+      _mm256_min_ps(_mm256_max_ps(_mm256_div_ps(dot8(p, e), length), _mm256_setzero_ps()), _mm256_set1_ps(1.0F));
   return {_mm256_fnmadd_ps(t, e.x, p.x), _mm256_fnmadd_ps(t, e.y, p.y), _mm256_fnmadd_ps(t, e.z, p.z)};
 }
 

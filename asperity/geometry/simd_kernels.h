@@ -13,8 +13,9 @@ struct alignas(32) BoxesOf8 {
   float upper[3][8];
 };
 
-/// Eight flat cylinders side by side: the set of points within `radius` of an axis and `half_height` of its middle. They fit
-/// the leaf of a smooth surface far tighter than a box: what a ball resting on it nearly touches is few cylinders.
+/// Eight flat cylinders side by side: the set of points within `radius` of an axis and `half_height` of its middle.
+/// They fit the leaf of a smooth surface far tighter than a box: what a ball resting on it nearly touches is few
+/// cylinders.
 struct alignas(32) CylindersOf8 {
   float centre[3][8];
   float axis[3][8];  ///< unit

@@ -11,8 +11,8 @@ namespace {
 // The skin is large against double rounding of the coordinates and small against any feature of the mesh.
 constexpr double skin_of_mean_edge = 1e-6;
 constexpr double least_skin_of_size = 1e-9;
-// A motion is blocked when it would come nearer than the first, and ends at the second. Between the two a probe slides freely, so
-// that rounding never holds it where it rests.
+// A motion is blocked when it would come nearer than the first, and ends at the second. Between the two a probe slides
+// freely, so that rounding never holds it where it rests.
 constexpr double blocked_in_skins = 0.5;
 constexpr double stopped_in_skins = 0.75;
 // Either distance counts as reached within this share of a skin.
@@ -23,8 +23,8 @@ constexpr double same_plane_cosine = 1.0 - 1e-10;
 // Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
 constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
-// A ball that moves by less than this share of its radius between two places where nothing reaches into it cannot have passed
-// anything: on the way a triangle comes nearer than at both ends by at most an eighth of length^2 / radius.
+// A ball that moves by less than this share of its radius between two places where nothing reaches into it cannot have
+// passed anything: on the way a triangle comes nearer than at both ends by at most an eighth of length^2 / radius.
 constexpr double glide_of_radius = 0.25;
 // A ball resting within this many skins of a triangle touches it.
 constexpr double touch_in_skins = 2.0;
@@ -38,7 +38,8 @@ void gather_from(const Bvh& bvh, const Vec3& centre, double reach, std::uint64_t
 }
 
 // The octree keeps to the papers and has no gathering of its own: an empty certificate sends every query to the tree.
-void gather_from(const TriangleOctree&, const Vec3& centre, double, std::uint64_t owner, TrianglePatch& patch) noexcept {
+void gather_from(const TriangleOctree&, const Vec3& centre, double, std::uint64_t owner,
+                 TrianglePatch& patch) noexcept {
   patch.owner = owner;
   patch.centre = centre;
   patch.certified = 0.0;
@@ -64,7 +65,8 @@ TriangleIndex TriangleIndex::build(TriangleMesh mesh, SearchStructure structure,
   TriangleIndex index;
   index.mesh_ = std::make_unique<const TriangleMesh>(std::move(mesh));
   index.identity_ = next_identity();
-  index.skin_ = std::max(skin_of_mean_edge * index.mesh_->mean_edge(), least_skin_of_size * index.mesh_->bounds().diagonal());
+  index.skin_ =
+      std::max(skin_of_mean_edge * index.mesh_->mean_edge(), least_skin_of_size * index.mesh_->bounds().diagonal());
   const Box& bounds = index.mesh_->bounds();
   const double size = bounds.diagonal() + bounds.lower.cwiseAbs().cwiseMax(bounds.upper.cwiseAbs()).norm();
   index.rounding_ = 64.0 * std::numeric_limits<double>::epsilon() * size;
@@ -77,14 +79,16 @@ TriangleIndex TriangleIndex::build(TriangleMesh mesh, SearchStructure structure,
 }
 
 std::size_t TriangleIndex::memory_bytes() const noexcept {
-  return mesh_->memory_bytes() + std::visit([](const auto& structure) { return structure.memory_bytes(); }, *structure_);
+  return mesh_->memory_bytes() +
+         std::visit([](const auto& structure) { return structure.memory_bytes(); }, *structure_);
 }
 
 FirstHit TriangleIndex::first_hit(const Segment& segment) const noexcept {
   return std::visit([&](const auto& structure) { return structure.first_hit(segment); }, *structure_);
 }
 
-Foot TriangleIndex::surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p, const Vec3& face_normal) const noexcept {
+Foot TriangleIndex::surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p,
+                                 const Vec3& face_normal) const noexcept {
   Foot answer;
   answer.point = point.point;
   answer.distance = std::sqrt(point.squared_distance);
@@ -130,7 +134,8 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
       best = hit.point;
       best_face = hit.face;
     }
-    if (best_face != no_index) gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh_->mean_edge(), patch);
+    if (best_face != no_index)
+      gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh_->mean_edge(), patch);
   }
   if (best_face == no_index) return {};
   patch.last_face = best_face;
@@ -209,7 +214,8 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
-bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept {
+bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, double touch,
+                              TrianglePatch& patch) const noexcept {
   const double margin = error(end);
   const double blocked = radius + blocked_in_skins * skin_;
   ContactSet contacts;
@@ -259,7 +265,8 @@ SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides,
   bool all_near_end = true;
   scan_ball(motion.from, touch + length, patch, [&](std::uint32_t face, double distance, const Vec3& offset) {
     // The distance is convex: along the motion it stays above its tangent at the start.
-    const double bound = distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
+    const double bound =
+        distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
     if (bound > touch) return;
     if (bound <= grown && !resting_on(face)) sweep_face(face, motion, radius, sides, best);
     all_near_end = near_end.push_back(face) && all_near_end;
@@ -290,8 +297,8 @@ void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double
   out.push_back(contact);
 }
 
-// A ball over a face also comes near the edges of its neighbours. The face's own plane keeps it off those edges; taken as
-// planes of their own, which lean back towards the ball, they would hold it at every edge it wants to slide across.
+// A ball over a face also comes near the edges of its neighbours. The face's own plane keeps it off those edges; taken
+// as planes of their own, which lean back towards the ball, they would hold it at every edge it wants to slide across.
 void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {
   const auto inside_face = [](const Foot& foot) { return foot.barycentric.minCoeff() > 0.0; };
   for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
@@ -303,7 +310,8 @@ void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) con
     }
     if (guard == nullptr) continue;
     double highest = -infinity;
-    for (const Vec3& corner : mesh_->corners(edge.element)) highest = std::max(highest, guard->normal.dot(corner - guard->point));
+    for (const Vec3& corner : mesh_->corners(edge.element))
+      highest = std::max(highest, guard->normal.dot(corner - guard->point));
     if (highest <= rounding_) {
       // Convex: the whole neighbour lies below the face's plane.
       contacts.swap_remove(i);

@@ -56,7 +56,8 @@ class TriangleIndex {
   /// Whether the patch covers the ball (position, reach), refilling it where that can help.
   bool ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept;
   void gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept;
-  /// Calls visit(face, distance, offset) for every triangle within `reach` of `position`, from the patch where it suffices.
+  /// Calls visit(face, distance, offset) for every triangle within `reach` of `position`, from the patch where it
+  /// suffices.
   template <class Visit>
   void scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept;
   /// Bound on the error of the distances that scan_ball gives (m).
@@ -65,8 +66,10 @@ class TriangleIndex {
   bool glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept;
   /// Makes of the edges and corners among the contacts what they mean beside a touched face.
   void settle_edges(const Vec3& position, ContactSet& contacts) const noexcept;
-  void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts, TrianglePatch& patch) const noexcept;
-  [[nodiscard]] Foot surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p, const Vec3& face_normal) const noexcept;
+  void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
+                TrianglePatch& patch) const noexcept;
+  [[nodiscard]] Foot surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p,
+                                  const Vec3& face_normal) const noexcept;
   void sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides, SweptHit& best) const noexcept;
   void add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides, ContactSet& out) const noexcept;
 

@@ -48,7 +48,9 @@ class ActiveSet {
  private:
   using Active = PlaneProjection::Active;
 
-  [[nodiscard]] double gram(std::size_t i, std::size_t j) const noexcept { return planes_[i].normal.dot(planes_[j].normal); }
+  [[nodiscard]] double gram(std::size_t i, std::size_t j) const noexcept {
+    return planes_[i].normal.dot(planes_[j].normal);
+  }
 
   bool none() noexcept {
     for (std::size_t i = 0; i < planes_.size(); ++i) least_worst_ = std::max(least_worst_, violation_[i]);

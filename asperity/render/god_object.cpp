@@ -39,7 +39,8 @@ void MeshConstraints::contacts(const Vec3& position, PlaneSet& out) noexcept {
     Entry& entry = entries_[i];
     const Pose& pose = entry.instance->world_from_object;
     ContactSet touched;
-    entry.mesh->contacts(entry.at_origin ? position : pose.apply_inverse(position), radius_, entry.instance->sides, entry.state->hint, touched);
+    entry.mesh->contacts(entry.at_origin ? position : pose.apply_inverse(position), radius_, entry.instance->sides,
+                         entry.state->hint, touched);
     for (const Foot& contact : touched) {
       const Vec3 normal = entry.at_origin ? contact.normal : pose.rotate(contact.normal);
       const Vec3 point = entry.at_origin ? contact.point : pose.apply(contact.point);
@@ -52,13 +53,15 @@ double MeshConstraints::sweep(const Segment& motion) noexcept {
   double first = 1.0;
   for (Entry& entry : entries_) {
     const Pose& pose = entry.instance->world_from_object;
-    const Segment local = entry.at_origin ? motion : Segment{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
+    const Segment local =
+        entry.at_origin ? motion : Segment{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
     first = std::min(first, entry.mesh->segment(local, radius_, entry.instance->sides, entry.state->hint).t);
   }
   return first;
 }
 
-LawForce MeshConstraints::force(std::size_t index, const ConstraintSolution& solution, const Vec3& probe, const Vec3& velocity) const noexcept {
+LawForce MeshConstraints::force(std::size_t index, const ConstraintSolution& solution, const Vec3& probe,
+                                const Vec3& velocity) const noexcept {
   const Entry& entry = entries_[index];
   const Material& material = entry.instance->material;
   LawForce answer;

@@ -28,7 +28,8 @@ class MeshConstraints {
   }
 
   /// Force of entry `index` for a solved tick, world frame, with the law's shading and the material's damping.
-  [[nodiscard]] LawForce force(std::size_t index, const ConstraintSolution& solution, const Vec3& probe, const Vec3& velocity) const noexcept;
+  [[nodiscard]] LawForce force(std::size_t index, const ConstraintSolution& solution, const Vec3& probe,
+                               const Vec3& velocity) const noexcept;
   [[nodiscard]] const Instance& instance(std::size_t index) const noexcept { return *entries_[index].instance; }
   [[nodiscard]] const ContactState& state(std::size_t index) const noexcept { return *entries_[index].state; }
 

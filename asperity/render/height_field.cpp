@@ -33,7 +33,8 @@ Taper edge_taper(double width, const BarycentricFrame& frame, const Vec3& baryce
 
 /// As printed: among the prisms that hold the probe, the one whose height field it is deepest under (2005: "the
 /// algorithm compares the heights in the textures of both triangles").
-LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe) noexcept {
+LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness,
+                       const Vec3& probe) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
   LawForce answer;
@@ -43,11 +44,19 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
     if (!prisms.contains(face, probe)) return;
     const BarycentricFrame frame = barycentric_frame(mesh, face);
     const Vec3 barycentric = frame.coordinates(probe);
-    const double height = edge_taper(law.edge_taper, frame, barycentric).factor * surface.coat().sample(mesh, face, barycentric).height;
+    const double height =
+        edge_taper(law.edge_taper, frame, barycentric).factor * surface.coat().sample(mesh, face, barycentric).height;
     const double penetration = height - std::abs(frame.height(probe));
-    const bool deeper = penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
+    const bool deeper =
+        penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
     if (penetration <= 0.0 || !deeper) return;
-    answer = {true, stiffness * penetration * frame.normal, probe + penetration * frame.normal, frame.normal, penetration, height, face};
+    answer = {true,
+              stiffness * penetration * frame.normal,
+              probe + penetration * frame.normal,
+              frame.normal,
+              penetration,
+              height,
+              face};
   });
   return answer;
 }
@@ -62,13 +71,14 @@ LawForce consistent_force(const HeightFieldLaw& law, const ReliefSurface& surfac
   const Taper taper = edge_taper(law.edge_taper, barycentric_frame(mesh, face), foot.nearest.barycentric);
   const double height = taper.factor * coat.height;
   const Vec3 gradient = foot.up - taper.factor * coat.gradient - coat.height * taper.gradient;
-  return potential_contact(foot.signed_distance - height, gradient, height, face, foot.beyond_rim, stiffness, probe, state);
+  return potential_contact(foot.signed_distance - height, gradient, height, face, foot.beyond_rim, stiffness, probe,
+                           state);
 }
 
 }  // namespace
 
-LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surface, const Material& material, const Vec3& probe,
-                            ContactState& state) noexcept {
+LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surface, const Material& material,
+                            const Vec3& probe, ContactState& state) noexcept {
   return law.formulation == Formulation::literal ? literal_force(law, surface, material.stiffness, probe)
                                                  : consistent_force(law, surface, material.stiffness, probe, state);
 }

@@ -10,17 +10,17 @@ namespace asperity {
 /// Force of one instance, object frame.
 struct LawForce {
   bool contact = false;
-  Vec3 force = Vec3::Zero();    ///< N
-  Vec3 point = Vec3::Zero();    ///< felt point of the surface (m)
-  Vec3 normal = Vec3::Zero();   ///< unit
-  double penetration = 0.0;     ///< m
-  double height = 0.0;          ///< relief height under the probe (m)
+  Vec3 force = Vec3::Zero();   ///< N
+  Vec3 point = Vec3::Zero();   ///< felt point of the surface (m)
+  Vec3 normal = Vec3::Zero();  ///< unit
+  double penetration = 0.0;    ///< m
+  double height = 0.0;         ///< relief height under the probe (m)
   std::uint32_t element = no_index;
 };
 
 /// haptic-textures-2005, 3.3; hrm-2010, Algorithm 1. `probe` and `velocity` in the object frame. [servo]
-LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surface, const Material& material, const Vec3& probe,
-                            ContactState& state) noexcept;
+LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surface, const Material& material,
+                            const Vec3& probe, ContactState& state) noexcept;
 /// hrm-2010, Algorithm 2. [servo]
 LawForce mesostructure_force(const MesostructureLaw& law, const ReliefSurface& surface, const Material& material,
                              const Vec3& probe, ContactState& state) noexcept;
@@ -28,14 +28,14 @@ LawForce mesostructure_force(const MesostructureLaw& law, const ReliefSurface& s
 /// The base under a probe, as the consistent forms of Algorithms 1 and 2 need it.
 struct BaseFoot {
   Foot nearest;
-  Vec3 up = Vec3::Zero();     ///< gradient of the signed distance
+  Vec3 up = Vec3::Zero();  ///< gradient of the signed distance
   double signed_distance = infinity;
-  bool beyond_rim = false;    ///< the foot is on the rim of an open mesh and the probe is not over the face
+  bool beyond_rim = false;  ///< the foot is on the rim of an open mesh and the probe is not over the face
 };
 BaseFoot base_foot(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept;
 
-/// Contact of a potential k Phi^2 / 2 whose penetration is -value: force = -k value gradient, if the probe came in from outside.
-/// Keeps state.seen_outside. [servo]
+/// Contact of a potential k Phi^2 / 2 whose penetration is -value: force = -k value gradient, if the probe came in from
+/// outside. Keeps state.seen_outside. [servo]
 LawForce potential_contact(double value, const Vec3& gradient, double height, std::uint32_t element, bool beyond_rim,
                            double stiffness, const Vec3& probe, ContactState& state) noexcept;
 

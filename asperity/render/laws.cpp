@@ -51,8 +51,11 @@ Result<Law> law_by_name(std::string_view name) {
   std::string list;
   for (const std::string& known : law_names()) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, law_names());
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no law{}", name, near.empty() ? "" : "; did you mean \"" + near + "\"?"),
-               {}, {}, list};
+  return Error{ErrorCode::bad_value,
+               fmt::format("\"{}\" is no law{}", name, near.empty() ? "" : "; did you mean \"" + near + "\"?"),
+               {},
+               {},
+               list};
 }
 
 Status validate(const Law& law) {
@@ -64,12 +67,14 @@ Status validate(const Law& law) {
     if (!(meso->rho > 0.0 && meso->rho <= 1.0 / 3.0)) return option_error("rho", meso->rho, "above 0, at most 1/3");
     if (meso->blend == Blend::image) {
       if (meso->blend_map.size() < 2) {
-        return Error{ErrorCode::bad_value, "has fewer than two values", {}, "blend_map", "an image at least two pixels wide"};
+        return Error{
+            ErrorCode::bad_value, "has fewer than two values", {}, "blend_map", "an image at least two pixels wide"};
       }
       for (const double value : meso->blend_map) {
         if (!(value >= 0.0 && value <= 1.0)) return option_error("blend_map", value, "weights from 0 to 1");
       }
-      if (meso->blend_map.back() <= 0.0) return option_error("blend_map", meso->blend_map.back(), "a weight above 0 at its right (inner) end");
+      if (meso->blend_map.back() <= 0.0)
+        return option_error("blend_map", meso->blend_map.back(), "a weight above 0 at its right (inner) end");
     }
   }
   return success();
@@ -89,7 +94,8 @@ BlendValue blend_value(const MesostructureLaw& law, double barycentric) noexcept
       const auto cell = std::min(static_cast<std::size_t>(position), law.blend_map.size() - 2);
       const double low = law.blend_map[cell];
       const double step = law.blend_map[cell + 1] - low;
-      return {low + step * (position - static_cast<double>(cell)), step * static_cast<double>(law.blend_map.size() - 1) * scale};
+      return {low + step * (position - static_cast<double>(cell)),
+              step * static_cast<double>(law.blend_map.size() - 1) * scale};
     }
   }
   return {1.0, 0.0};

@@ -14,8 +14,8 @@ namespace asperity {
 enum class Formulation { literal, consistent };
 
 /// Constraint-based god-object on the geometry (Zilles and Salisbury 1995; a ball where the probe has a radius, Ruspini
-/// 1997). Each tick ends with the complete solve: the proxy is the constrained local minimiser of its distance to the probe.
-/// On a coated mesh it feels the base alone.
+/// 1997). Each tick ends with the complete solve: the proxy is the constrained local minimiser of its distance to the
+/// probe. On a coated mesh it feels the base alone.
 struct GodObjectLaw {};
 
 /// God-object force turned into the direction of the coat's normal map at the contact, or of the interpolated vertex
@@ -24,9 +24,11 @@ struct GodObjectLaw {};
 struct ForceShadingLaw {};
 
 /// Height field over the base triangle (haptic-textures-2005, 3.3; hrm-2010, Algorithm 1).
-///   literal     in the prism, penetration = H - |distance to the plane|, force along the plane's normal; contact is lost below the
+///   literal     in the prism, penetration = H - |distance to the plane|, force along the plane's normal; contact is
+///   lost below the
 ///               base at depth H, and heights below 0 are never met (erratum 1)
-///   consistent  penetration = H - h with the signed distance h of the nearest base point, force = -grad(k (h - H)^2 / 2):
+///   consistent  penetration = H - h with the signed distance h of the nearest base point, force = -grad(k (h - H)^2 /
+///   2):
 ///               no energy from nothing (errata 1, 10)
 struct HeightFieldLaw {
   Formulation formulation = Formulation::consistent;
@@ -39,12 +41,12 @@ struct HeightFieldLaw {
 enum class Blend { none, linear, s_shape, image };
 
 /// Mesostructure blended over adjoining faces (hrm-2010, Algorithm 2).
-///   literal     the printed band test, unsigned distance to one plane, averaged normals that are not unit (errata 1, 2, 4, 5)
-///   consistent  blended signed penetration sum w_i (H_i - h_i) / sum w_i over the faces around, its gradient
+///   literal     the printed band test, unsigned distance to one plane, averaged normals that are not unit (errata 1,
+///   2, 4, 5) consistent  blended signed penetration sum w_i (H_i - h_i) / sum w_i over the faces around, its gradient
 ///               included: force = -grad(k Phi^2 / 2), continuous where the weights are
 struct MesostructureLaw {
   Formulation formulation = Formulation::consistent;
-  double rho = 0.05;            ///< width of the band in barycentric coordinates, above 0, at most 1/3
+  double rho = 0.05;  ///< width of the band in barycentric coordinates, above 0, at most 1/3
   Blend blend = Blend::s_shape;
   std::vector<double> blend_map;  ///< Blend::image: weights at t = 0 … 1, evenly spaced, at least two
 };

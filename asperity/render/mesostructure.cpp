@@ -26,10 +26,11 @@ FaceWeight face_weight(const MesostructureLaw& law, const BarycentricFrame& fram
   return answer;
 }
 
-/// Fades a face out where its plane runs away from the base, over twice the band: the projection of a probe under one side
-/// of a sharp fold can fall into the face on the other, whose plane says nothing about the depth there. On flat
+/// Fades a face out where its plane runs away from the base, over twice the band: the projection of a probe under one
+/// side of a sharp fold can fall into the face on the other, whose plane says nothing about the depth there. On flat
 /// parts, and where two faces are equally near, it is 1 with a gradient of 0, so that Phi stays as smooth as it is.
-FaceWeight nearness(const MesostructureLaw& law, const BarycentricFrame& frame, double height, const BaseFoot& foot) noexcept {
+FaceWeight nearness(const MesostructureLaw& law, const BarycentricFrame& frame, double height,
+                    const BaseFoot& foot) noexcept {
   double steepest = 0.0;
   for (const Vec3& gradient : frame.gradient) steepest = std::max(steepest, gradient.norm());
   const double per_width = steepest / (2.0 * law.rho);
@@ -40,9 +41,11 @@ FaceWeight nearness(const MesostructureLaw& law, const BarycentricFrame& frame, 
   return {t * t * (3.0 - 2.0 * t), slope * (frame.normal - foot.up)};
 }
 
-/// Lines 4 to 34 as printed, with three liberties that the text leaves no way around: the weight function (undefined there), the
-/// normals turned from each face's tangent frame into the object's, and of several prisms the one whose plane is nearest.
-LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe) noexcept {
+/// Lines 4 to 34 as printed, with three liberties that the text leaves no way around: the weight function (undefined
+/// there), the normals turned from each face's tangent frame into the object's, and of several prisms the one whose
+/// plane is nearest.
+LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness,
+                       const Vec3& probe) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
   std::uint32_t owner = no_index;
@@ -94,8 +97,8 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
   return answer;
 }
 
-LawForce consistent_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe,
-                          ContactState& state) noexcept {
+LawForce consistent_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness,
+                          const Vec3& probe, ContactState& state) noexcept {
   const BaseFoot foot = base_foot(surface, probe, state.hint);
   if (!foot.nearest.found()) return {};
   const TriangleMesh& mesh = surface.base().mesh();
@@ -125,12 +128,13 @@ LawForce consistent_force(const MesostructureLaw& law, const ReliefSurface& surf
   if (weights <= 0.0) {
     // High over a convex edge the probe projects into no face: the nearest base point stands in.
     const CoatSample sample = surface.coat().sample(mesh, foot.nearest.element, foot.nearest.barycentric);
-    return potential_contact(foot.signed_distance - sample.height, foot.up - sample.gradient, sample.height, foot.nearest.element,
-                             foot.beyond_rim, stiffness, probe, state);
+    return potential_contact(foot.signed_distance - sample.height, foot.up - sample.gradient, sample.height,
+                             foot.nearest.element, foot.beyond_rim, stiffness, probe, state);
   }
   const double value = values / weights;
   const Vec3 gradient = (value_gradient - value * weight_gradient) / weights;
-  return potential_contact(value, gradient, heights / weights, foot.nearest.element, foot.beyond_rim, stiffness, probe, state);
+  return potential_contact(value, gradient, heights / weights, foot.nearest.element, foot.beyond_rim, stiffness, probe,
+                           state);
 }
 
 }  // namespace

@@ -29,16 +29,26 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
   if (bare && needs_coat(instance.law)) {
-    return Error{ErrorCode::unsupported_pair, fmt::format("the law \"{}\" needs a coat, and \"{}\" is a bare mesh", law_name(instance.law), instance.name),
-                 {}, place + ".law", "god-object or force-shading, or a coat on the mesh"};
+    return Error{
+        ErrorCode::unsupported_pair,
+        fmt::format("the law \"{}\" needs a coat, and \"{}\" is a bare mesh", law_name(instance.law), instance.name),
+        {},
+        place + ".law",
+        "god-object or force-shading, or a coat on the mesh"};
   }
   if (probe_radius > 0.0 && !constrains(instance.law)) {
-    return Error{ErrorCode::unsupported_pair, fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}", law_name(instance.law), format_length(probe_radius)),
-                 {}, place + ".law", "god-object or force-shading, or probe.radius 0"};
+    return Error{ErrorCode::unsupported_pair,
+                 fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
+                             law_name(instance.law), format_length(probe_radius)),
+                 {},
+                 place + ".law",
+                 "god-object or force-shading, or probe.radius 0"};
   }
   const Pose& pose = instance.world_from_object;
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() || std::abs(pose.orientation.norm() - 1.0) > 1e-9) {
-    return Error{ErrorCode::bad_value, "is not a finite position and unit quaternion", {}, place + ".pose", "finite numbers"};
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
+      std::abs(pose.orientation.norm() - 1.0) > 1e-9) {
+    return Error{
+        ErrorCode::bad_value, "is not a finite position and unit quaternion", {}, place + ".pose", "finite numbers"};
   }
   return success();
 }
@@ -46,7 +56,8 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
 Box transformed(const Box& box, const Pose& pose) {
   Box world;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 local((corner & 1) != 0 ? box.upper.x() : box.lower.x(), (corner & 2) != 0 ? box.upper.y() : box.lower.y(),
+    const Vec3 local((corner & 1) != 0 ? box.upper.x() : box.lower.x(),
+                     (corner & 2) != 0 ? box.upper.y() : box.lower.y(),
                      (corner & 4) != 0 ? box.upper.z() : box.lower.z());
     world.include(pose.apply(local));
   }
@@ -55,7 +66,9 @@ Box transformed(const Box& box, const Pose& pose) {
 
 }  // namespace
 
-const char* surface_kind(const Surface& surface) { return surface.index() == 0 ? "mesh" : "relief"; }
+const char* surface_kind(const Surface& surface) {
+  return surface.index() == 0 ? "mesh" : "relief";
+}
 
 Box surface_bounds(const Surface& surface) {
   return std::visit([](const auto& s) { return s->bounds(); }, surface);
@@ -68,7 +81,8 @@ const TriangleMesh& base_mesh(const Surface& surface) {
 
 Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius) {
   if (!std::isfinite(probe_radius) || probe_radius < 0.0) {
-    return Error{ErrorCode::bad_value, fmt::format("is {}", probe_radius), {}, "probe.radius", "a length of 0 or more (m, mm)"};
+    return Error{
+        ErrorCode::bad_value, fmt::format("is {}", probe_radius), {}, "probe.radius", "a length of 0 or more (m, mm)"};
   }
   if (instances.empty()) {
     return Error{ErrorCode::bad_value, "holds nothing to touch", {}, "surfaces", "at least one surface"};
@@ -78,7 +92,8 @@ Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius)
     ASPERITY_CHECK(check(instances[i], i, probe_radius));
     // Room for the probe and for the skin that it rests on.
     const Box bounds = surface_bounds(instances[i].surface);
-    scene.bounds_.push_back(transformed(bounds.grown(probe_radius + 1e-6 * bounds.diagonal()), instances[i].world_from_object));
+    scene.bounds_.push_back(
+        transformed(bounds.grown(probe_radius + 1e-6 * bounds.diagonal()), instances[i].world_from_object));
   }
   scene.instances_ = std::move(instances);
   scene.probe_radius_ = probe_radius;

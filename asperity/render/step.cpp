@@ -36,7 +36,9 @@ bool update_slots(const Scene& scene, ProxyState& state, const Box& reach) noexc
   for (std::size_t i = state.contacts.size(); i-- > 0;) {
     const std::uint32_t instance = state.contacts[i].instance;
     // Under a thin sheet a pressed probe is far outside the sheet's own bounds, and still in contact.
-    if (instance < scene.instances().size() && (state.contacts[i].touching || overlap(scene.world_bounds(instance), reach))) continue;
+    if (instance < scene.instances().size() &&
+        (state.contacts[i].touching || overlap(scene.world_bounds(instance), reach)))
+      continue;
     state.contacts.swap_remove(i);
   }
   bool all = true;
@@ -54,7 +56,8 @@ bool update_slots(const Scene& scene, ProxyState& state, const Box& reach) noexc
   return all;
 }
 
-LawForce relief_force(const Instance& instance, const ReliefSurface& relief, const Vec3& probe, ContactState& slot) noexcept {
+LawForce relief_force(const Instance& instance, const ReliefSurface& relief, const Vec3& probe,
+                      ContactState& slot) noexcept {
   if (const auto* law = std::get_if<HeightFieldLaw>(&instance.law)) {
     return height_field_force(*law, relief, instance.material, probe, slot);
   }
@@ -62,27 +65,30 @@ LawForce relief_force(const Instance& instance, const ReliefSurface& relief, con
 }
 
 /// A law without a proxy, in the world frame.
-LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick, ContactState& slot) noexcept {
+LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick,
+                     ContactState& slot) noexcept {
   const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   const Pose& pose = instance.world_from_object;
   // A probe that enters within one tick was outside at the last one: ask there first.
   if (!slot.seen_outside && !first_tick) relief_force(instance, relief, pose.apply_inverse(previous), slot);
   LawForce law = relief_force(instance, relief, pose.apply_inverse(probe.pose.position), slot);
   if (!law.contact) return law;
-  law.force = with_damping(pose.rotate(law.force), pose.rotate(law.normal), probe.twist.linear, instance.material.damping);
+  law.force =
+      with_damping(pose.rotate(law.force), pose.rotate(law.normal), probe.twist.linear, instance.material.damping);
   law.point = pose.apply(law.point);
   law.normal = pose.rotate(law.normal);
   return law;
 }
 
 bool finite(const ProbeSample& probe) noexcept {
-  return probe.pose.position.allFinite() && probe.pose.orientation.coeffs().allFinite() && probe.twist.linear.allFinite() &&
-         probe.twist.angular.allFinite();
+  return probe.pose.position.allFinite() && probe.pose.orientation.coeffs().allFinite() &&
+         probe.twist.linear.allFinite() && probe.twist.angular.allFinite();
 }
 
 }  // namespace
 
-ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe, [[maybe_unused]] Seconds dt) noexcept {
+ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe,
+                 [[maybe_unused]] Seconds dt) noexcept {
   Tick tick;
   const Vec3& position = probe.pose.position;
   if (!finite(probe)) {

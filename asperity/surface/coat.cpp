@@ -12,12 +12,13 @@ namespace asperity {
 namespace {
 
 struct TextureFrame {
-  Vec2 st;         ///< texture coordinates
-  Vec3 gradient_s; ///< of s over the surface (1/m)
+  Vec2 st;          ///< texture coordinates
+  Vec3 gradient_s;  ///< of s over the surface (1/m)
   Vec3 gradient_t;
 };
 
-std::array<Vec2, 3> corner_coordinates(const TriangleMesh& mesh, std::uint32_t face, const CoatSettings& settings) noexcept {
+std::array<Vec2, 3> corner_coordinates(const TriangleMesh& mesh, std::uint32_t face,
+                                       const CoatSettings& settings) noexcept {
   std::array<Vec2, 3> st;
   if (settings.mapping == Mapping::per_face) {
     st = {Vec2(0.0, 0.0), Vec2(1.0, 0.0), Vec2(0.5, 0.5 * std::numbers::sqrt3)};
@@ -29,8 +30,8 @@ std::array<Vec2, 3> corner_coordinates(const TriangleMesh& mesh, std::uint32_t f
   return st;
 }
 
-TextureFrame texture_frame(const TriangleMesh& mesh, std::uint32_t face, const BarycentricFrame& frame, const Vec3& barycentric,
-                           const CoatSettings& settings) noexcept {
+TextureFrame texture_frame(const TriangleMesh& mesh, std::uint32_t face, const BarycentricFrame& frame,
+                           const Vec3& barycentric, const CoatSettings& settings) noexcept {
   const auto st = corner_coordinates(mesh, face, settings);
   TextureFrame texture{Vec2::Zero(), Vec3::Zero(), Vec3::Zero()};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -41,7 +42,8 @@ TextureFrame texture_frame(const TriangleMesh& mesh, std::uint32_t face, const B
   return texture;
 }
 
-/// Slope (m/m) that a tangent-space normal stands for. Normals as flat as this bound are steeper than any hand can follow.
+/// Slope (m/m) that a tangent-space normal stands for. Normals as flat as this bound are steeper than any hand can
+/// follow.
 Vec2 slope_of(const Vec3& normal) noexcept {
   const double up = std::max(normal.z(), 1e-3);
   return {-normal.x() / up, -normal.y() / up};
@@ -67,12 +69,21 @@ BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face)
   return frame;
 }
 
-Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps, const CoatSettings& settings) {
+Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
+                         const CoatSettings& settings) {
   if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0) {
-    return Error{ErrorCode::bad_value, fmt::format("is {} x {}", settings.repeat.x(), settings.repeat.y()), {}, "repeat", "numbers above 0"};
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {} x {}", settings.repeat.x(), settings.repeat.y()),
+                 {},
+                 "repeat",
+                 "numbers above 0"};
   }
   if (settings.mapping == Mapping::uv && !mesh.has_uvs()) {
-    return Error{ErrorCode::mismatch, "is \"uv\", but the mesh has no texture coordinates", {}, "mapping", "\"triplanar\" or \"per_face\""};
+    return Error{ErrorCode::mismatch,
+                 "is \"uv\", but the mesh has no texture coordinates",
+                 {},
+                 "mapping",
+                 "\"triplanar\" or \"per_face\""};
   }
   Coat coat;
   coat.maps_ = std::move(maps);
@@ -90,12 +101,17 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostr
     const Vec2 one = corners[1] - corners[0];
     const Vec2 other = corners[2] - corners[0];
     if (one.x() * other.y() == one.y() * other.x()) continue;
-    const TextureFrame texture = texture_frame(mesh, face, barycentric_frame(mesh, face), Vec3(1.0, 0.0, 0.0), settings);
-    const double texels = std::max(texture.gradient_s.norm() * heights.width(), texture.gradient_t.norm() * heights.height());
+    const TextureFrame texture =
+        texture_frame(mesh, face, barycentric_frame(mesh, face), Vec3(1.0, 0.0, 0.0), settings);
+    const double texels =
+        std::max(texture.gradient_s.norm() * heights.width(), texture.gradient_t.norm() * heights.height());
     if (texels > 0.0 && std::isfinite(texels)) sizes.push_back(1.0 / texels);
   }
   if (sizes.empty()) {
-    return Error{ErrorCode::mismatch, "is \"uv\", but the texture coordinates span no area on any face looked at", {}, "mapping",
+    return Error{ErrorCode::mismatch,
+                 "is \"uv\", but the texture coordinates span no area on any face looked at",
+                 {},
+                 "mapping",
                  "\"triplanar\" or \"per_face\""};
   }
   std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
@@ -104,7 +120,8 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostr
 }
 
 CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
-  return settings_.mapping == Mapping::triplanar ? sample_triplanar(mesh, face, barycentric) : sample_flat(mesh, face, barycentric);
+  return settings_.mapping == Mapping::triplanar ? sample_triplanar(mesh, face, barycentric)
+                                                 : sample_flat(mesh, face, barycentric);
 }
 
 CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
@@ -126,7 +143,8 @@ CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const
   return sample;
 }
 
-CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
+CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
+                                  const Vec3& barycentric) const noexcept {
   const BarycentricFrame frame = barycentric_frame(mesh, face);
   const TriangleMesh::Triangle& corners = mesh.triangles()[face];
   Vec3 point = Vec3::Zero();
@@ -147,7 +165,8 @@ CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face, 
   Vec3 shading_gradient = Vec3::Zero();
   Vec3 total_gradient = Vec3::Zero();
   for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 power_gradient = 4.0 * normal[axis] * normal[axis] * normal[axis] * normal_gradient.row(axis).transpose();
+    const Vec3 power_gradient =
+        4.0 * normal[axis] * normal[axis] * normal[axis] * normal_gradient.row(axis).transpose();
     total_gradient += power_gradient;
     if (power[axis] <= 0.0) continue;
     const int s = (axis + 1) % 3;

@@ -9,9 +9,9 @@
 namespace asperity {
 
 /// How texture coordinates are found on a triangle.
-///   per_face   every triangle carries the map's lower left, lower right and (1/2, sqrt(3)/2): equilateral triangles keep angles
-///   uv         the mesh's own corner UVs, times `repeat`
-///   triplanar  the position projected along the three axes, one tile of the map each, mixed by the fourth powers of the
+///   per_face   every triangle carries the map's lower left, lower right and (1/2, sqrt(3)/2): equilateral triangles
+///   keep angles uv         the mesh's own corner UVs, times `repeat` triplanar  the position projected along the three
+///   axes, one tile of the map each, mixed by the fourth powers of the
 ///              smooth normal's components: continuous over every edge, no UVs needed
 enum class Mapping { per_face, uv, triplanar };
 
@@ -22,19 +22,21 @@ struct CoatSettings {
 
 /// The coat at one place of one triangle, object frame.
 struct CoatSample {
-  double height = 0.0;             ///< H (m), positive outward
-  Vec3 gradient = Vec3::Zero();    ///< surface gradient of H in the triangle's plane (m/m)
-  Vec3 normal = Vec3::Zero();      ///< unit normal of the relief: the given normal map's where there is one, else from `gradient`
+  double height = 0.0;           ///< H (m), positive outward
+  Vec3 gradient = Vec3::Zero();  ///< surface gradient of H in the triangle's plane (m/m)
+  Vec3 normal =
+      Vec3::Zero();  ///< unit normal of the relief: the given normal map's where there is one, else from `gradient`
 };
 
 /// A mesostructure laid on a mesh (hrm-2010, section 4). Immutable; shares the maps with other coats.
 class Coat {
  public:
   /// Errors: bad_value (repeat), mismatch (uv mapping on a mesh without UVs, or with UVs that span no area). [build]
-  static Result<Coat> build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps, const CoatSettings& settings);
+  static Result<Coat> build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
+                            const CoatSettings& settings);
 
-  /// The coat over the point of `face` with these barycentric coordinates, which may lie outside the triangle (its plane
-  /// and its mapping are continued): stitching needs that. [servo]
+  /// The coat over the point of `face` with these barycentric coordinates, which may lie outside the triangle (its
+  /// plane and its mapping are continued): stitching needs that. [servo]
   [[nodiscard]] CoatSample sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept;
 
   /// Bounds of every height of the coat (m), overshoot of the reconstruction included. [any]
@@ -50,8 +52,10 @@ class Coat {
 
  private:
   Coat() = default;
-  [[nodiscard]] CoatSample sample_flat(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept;
-  [[nodiscard]] CoatSample sample_triplanar(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept;
+  [[nodiscard]] CoatSample sample_flat(const TriangleMesh& mesh, std::uint32_t face,
+                                       const Vec3& barycentric) const noexcept;
+  [[nodiscard]] CoatSample sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
+                                            const Vec3& barycentric) const noexcept;
 
   std::shared_ptr<const Mesostructure> maps_;
   CoatSettings settings_;

@@ -29,7 +29,8 @@ bool Prisms::contains(std::uint32_t face, const Vec3& p) const noexcept {
     low[i] = mesh_->positions()[order[i]] - offset;
     high[i] = mesh_->positions()[order[i]] + offset;
   }
-  return tetrahedron_contains(p, low[0], low[1], low[2], high[2]) || tetrahedron_contains(p, low[0], low[1], high[1], high[2]) ||
+  return tetrahedron_contains(p, low[0], low[1], low[2], high[2]) ||
+         tetrahedron_contains(p, low[0], low[1], high[1], high[2]) ||
          tetrahedron_contains(p, low[0], high[0], high[1], high[2]);
 }
 

@@ -65,7 +65,8 @@ SweptHit ReliefSurface::segment(const Segment& motion, double radius, Sides side
     const double above = here.value + here.height - highest;
     const double bounded = std::abs(here.value - radius) / lipschitz_;
     before = travelled;
-    travelled = std::min(length, travelled + std::max({above, bounded, least, share_of_height * std::abs(here.value - radius)}));
+    travelled = std::min(
+        length, travelled + std::max({above, bounded, least, share_of_height * std::abs(here.value - radius)}));
     here = eval(motion.from + (travelled / length) * direction, hint);
     const double now = here.value >= radius ? 1.0 : -1.0;
     if (now == sign) continue;

@@ -20,27 +20,35 @@ struct Hint {
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.
 struct FieldSample {
-  double value = infinity;          ///< m
-  Vec3 gradient = Vec3::Zero();     ///< m/m; of length 1 where `value` is a true distance
-  double height = 0.0;              ///< relief height of the coat under the point (m); 0 without a coat
-  std::uint32_t element = no_index; ///< face under the point; no_index beyond the provider's reach
+  double value = infinity;           ///< m
+  Vec3 gradient = Vec3::Zero();      ///< m/m; of length 1 where `value` is a true distance
+  double height = 0.0;               ///< relief height of the coat under the point (m); 0 without a coat
+  std::uint32_t element = no_index;  ///< face under the point; no_index beyond the provider's reach
 };
 
 /// A provider answers these queries, all const, noexcept and without allocation, in its own object frame.
 ///   segment   first touch of a ball of radius r moving along a segment, from either side or the front alone
-///   contacts  every plane that such a ball touches where it rests: what a constraint solve needs at once. (A solve that
+///   contacts  every plane that such a ball touches where it rests: what a constraint solve needs at once. (A solve
+///   that
 ///             only knew the last hit could not rest in a corner without finding the other walls again by moving.)
 ///   closest   the surface's nearest point within a bound
 ///   eval      signed value and gradient of the implicit function
 ///   skin      distance that separates a resting probe from the surface; contacts and segment use it, forces do not
 template <class S>
-concept SurfaceQuery = requires(const S& s, const Segment& g, const Vec3& p, double r, Sides sides, Hint& h, ContactSet& out) {
-  { s.segment(g, r, sides, h) } noexcept -> std::same_as<SweptHit>;
-  { s.contacts(p, r, sides, h, out) } noexcept -> std::same_as<void>;
-  { s.closest(p, r, h) } noexcept -> std::same_as<Foot>;
-  { s.eval(p, h) } noexcept -> std::same_as<FieldSample>;
-  { s.skin() } noexcept -> std::same_as<double>;
-  { s.bounds() } noexcept -> std::same_as<Box>;
+concept SurfaceQuery = requires(const S& s, const Segment& g, const Vec3& p, double r, Sides sides, Hint& h,
+                                ContactSet& out) {
+  { s.segment(g, r, sides, h) }
+  noexcept->std::same_as<SweptHit>;
+  { s.contacts(p, r, sides, h, out) }
+  noexcept->std::same_as<void>;
+  { s.closest(p, r, h) }
+  noexcept->std::same_as<Foot>;
+  { s.eval(p, h) }
+  noexcept->std::same_as<FieldSample>;
+  { s.skin() }
+  noexcept->std::same_as<double>;
+  { s.bounds() }
+  noexcept->std::same_as<Box>;
 };
 
 /// A base mesh with a coat over it, each triangle owning a prism: what Algorithms 1 and 2 need.

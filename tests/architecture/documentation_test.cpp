@@ -69,7 +69,9 @@ TEST(Documentation, FirstProgramHasTenLinesAndStandsInTheReadme) {
 
   const std::vector<SourceFile> readme = files_below("README.md", {".md"});
   if (readme.empty()) GTEST_SKIP() << "there is no README.md yet";
-  EXPECT_EQ(lines_between(readme.front(), "```cpp", "```"), examples.front().lines)
+  const std::vector<std::string>& lines = examples.front().lines;
+  const auto program = std::find(lines.begin(), lines.end(), "#include <cstdio>");
+  EXPECT_EQ(lines_between(readme.front(), "```cpp", "```"), std::vector<std::string>(program, lines.end()))
       << "README.md shows another program than examples/first_touch.cpp";
 }
 

@@ -42,7 +42,9 @@ TEST(Units, LengthsAreWrittenWithTheUnitThatSuits) {
 }
 
 TEST(Error, MessageNamesFilePlaceCauseAndCure) {
-  const Error error = Error{ErrorCode::bad_value, "is negative", {}, "height", "a length above 0"}.at("surfaces[0].coat").in_file("scene.json");
+  const Error error = Error{ErrorCode::bad_value, "is negative", {}, "height", "a length above 0"}
+                          .at("surfaces[0].coat")
+                          .in_file("scene.json");
   EXPECT_EQ(error.message(), "scene.json: surfaces[0].coat.height: is negative; accepted: a length above 0");
   EXPECT_STREQ(to_string(error.code), "bad_value");
 }

@@ -99,7 +99,8 @@ TEST(Bvh, BoxQueryFindsEveryTriangleWhoseBoxMeets) {
       for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
         Box own;
         for (const Vec3& corner : mesh.corners(face)) own.include(corner);
-        const bool meets = (own.lower.array() <= box.upper.array()).all() && (box.lower.array() <= own.upper.array()).all();
+        const bool meets =
+            (own.lower.array() <= box.upper.array()).all() && (box.lower.array() <= own.upper.array()).all();
         EXPECT_TRUE(!meets || found[face] == 1) << "face " << face;
         EXPECT_LE(found[face], 1);
       }
@@ -119,7 +120,9 @@ TEST(TriangleIndex, CoherentClosestIsExactOnRandomWalks) {
       Vec3 p = random_point(rng, around);
       for (int i = 0; i < 150; ++i) {
         const double reach = size * std::pow(10.0, rng.uniform(-5.0, -0.5));
-        p = (p + reach * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0))).cwiseMax(around.lower).cwiseMin(around.upper);
+        p = (p + reach * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)))
+                .cwiseMax(around.lower)
+                .cwiseMin(around.upper);
         const double expected = brute_squared_distance(index.mesh(), p);
         ASSERT_EQ(index.closest(p, infinity, patch).distance, std::sqrt(expected));
       }
@@ -140,7 +143,8 @@ TEST(TriangleIndex, PatchOfAnotherMeshIsNeverRead) {
 TEST(TriangleIndex, SweepStopsWhereTheBallFirstTouches) {
   Rng rng(6);
   for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
-    const TriangleIndex index = TriangleIndex::build(TriangleMesh::build(random_closed_mesh(9, 2, 0.05, 0.5)).value(), structure);
+    const TriangleIndex index =
+        TriangleIndex::build(TriangleMesh::build(random_closed_mesh(9, 2, 0.05, 0.5)).value(), structure);
     const Box around = index.mesh().bounds().grown(0.03);
     int hits = 0;
     for (int i = 0; i < 400; ++i) {
@@ -191,12 +195,14 @@ TEST(SimdKernels, PlainAndBestAgree) {
       for (int lane = 0; lane < 8; ++lane) {
         triangles.corner[axis][lane] = static_cast<float>(rng.uniform(-1.0, 1.0));
         triangles.edge1[axis][lane] = static_cast<float>(rng.uniform(-0.3, 0.3));
-        triangles.edge2[axis][lane] = lane == 3 ? 2.0F * triangles.edge1[axis][lane] : static_cast<float>(rng.uniform(-0.3, 0.3));
+        triangles.edge2[axis][lane] =
+            lane == 3 ? 2.0F * triangles.edge1[axis][lane] : static_cast<float>(rng.uniform(-0.3, 0.3));
         boxes.lower[axis][lane] = static_cast<float>(rng.uniform(-1.0, 0.0));
         boxes.upper[axis][lane] = boxes.lower[axis][lane] + static_cast<float>(rng.uniform(0.0, 1.0));
       }
     }
-    const float point[3] = {static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0))};
+    const float point[3] = {static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0)),
+                            static_cast<float>(rng.uniform(-1.0, 1.0))};
     DistancesOf8 plain;
     DistancesOf8 best;
     plain_kernels().triangles(triangles, point, plain);

@@ -16,7 +16,8 @@ constexpr double stiffness = 1000.0;
 constexpr Seconds tick(1e-3);
 
 std::shared_ptr<const MeshSurface> surface_of(MeshSource source, double scale = 1.0) {
-  return std::make_shared<const MeshSurface>(TriangleIndex::build(TriangleMesh::build(std::move(source), {scale, true}).value()));
+  return std::make_shared<const MeshSurface>(
+      TriangleIndex::build(TriangleMesh::build(std::move(source), {scale, true}).value()));
 }
 
 Scene scene_of(const std::shared_ptr<const MeshSurface>& surface, double probe_radius, Pose pose = {}) {
@@ -35,7 +36,9 @@ ProbeSample at(const Vec3& position) {
   return sample;
 }
 
-double random_sign(Rng& rng) { return rng.uniform() < 0.5 ? -1.0 : 1.0; }
+double random_sign(Rng& rng) {
+  return rng.uniform() < 0.5 ? -1.0 : 1.0;
+}
 
 Vec3 random_direction(Rng& rng) {
   for (;;) {
@@ -51,7 +54,8 @@ double sharpest_fold(const TriangleMesh& mesh) {
   for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
     for (int edge = 0; edge < 3; ++edge) {
       const std::uint32_t other = mesh.neighbour(face, edge);
-      if (other != no_index) smallest_cosine = std::min(smallest_cosine, mesh.face_normal(face).dot(mesh.face_normal(other)));
+      if (other != no_index)
+        smallest_cosine = std::min(smallest_cosine, mesh.face_normal(face).dot(mesh.face_normal(other)));
     }
   }
   return std::acos(smallest_cosine);
@@ -60,15 +64,16 @@ double sharpest_fold(const TriangleMesh& mesh) {
 struct Tally {
   int ticks = 0;
   int touching = 0;
-  int through = 0;       // the proxy is inside
-  int stuck = 0;         // force over 1.5 x stiffness x true depth
+  int through = 0;  // the proxy is inside
+  int stuck = 0;    // force over 1.5 x stiffness x true depth
   int unconverged = 0;
   double worst_ratio = 0.0;
   double worst_inside = 0.0;
 };
 
 /// A walk of pokes and slides: a place on the surface wanders, the probe goes in and out of it at random depths.
-void poke_and_slide(const Scene& scene, const MeshSurface& surface, double radius, double deepest, Rng& rng, int ticks, Tally& tally) {
+void poke_and_slide(const Scene& scene, const MeshSurface& surface, double radius, double deepest, Rng& rng, int ticks,
+                    Tally& tally) {
   const TriangleMesh& mesh = surface.mesh();
   const double edge = mesh.mean_edge();
   ProxyState state;
@@ -105,9 +110,10 @@ Tally campaign(bool with_radius, std::uint64_t seed, int meshes, int ticks_each)
   Tally tally;
   Rng rng(seed);
   for (int m = 0; m < meshes; ++m) {
-    // A ridge folded by theta holds a god-object back until the depth ratio is 1 / cos(theta): folds stay below 48 degrees
-    // so that 1.5 is beyond anything a right answer can give.
-    const auto surface = surface_of(random_closed_mesh(rng.next(), 2 + static_cast<int>(rng.below(3)), 0.05, rng.uniform(0.02, 0.25)));
+    // A ridge folded by theta holds a god-object back until the depth ratio is 1 / cos(theta): folds stay below 48
+    // degrees so that 1.5 is beyond anything a right answer can give.
+    const auto surface =
+        surface_of(random_closed_mesh(rng.next(), 2 + static_cast<int>(rng.below(3)), 0.05, rng.uniform(0.02, 0.25)));
     if (sharpest_fold(surface->mesh()) > 0.7) {
       --m;
       continue;
@@ -182,7 +188,8 @@ TEST(GodObject, LateralForceOnAFlatPlaneIsExactlyZeroAtEveryTick) {
     step(scene, state, at(Vec3(-0.04, -0.03, 0.01)), tick);
     for (int i = 0; i < 20000; ++i) {
       const double s = i / 20000.0;
-      const Vec3 probe(-0.04 + 0.08 * s, -0.03 + 0.05 * s + 0.003 * std::sin(40.0 * s), radius - 0.001 - 0.0005 * std::sin(90.0 * s));
+      const Vec3 probe(-0.04 + 0.08 * s, -0.03 + 0.05 * s + 0.003 * std::sin(40.0 * s),
+                       radius - 0.001 - 0.0005 * std::sin(90.0 * s));
       const ForceSample force = step(scene, state, at(probe), tick);
       ASSERT_EQ(force.wrench.force.x(), 0.0) << i;
       ASSERT_EQ(force.wrench.force.y(), 0.0) << i;

@@ -106,7 +106,8 @@ TEST(MeshSurface, answers_the_same_with_and_without_a_hint) {
     const FieldSample a = surface->eval(p, kept);
     const FieldSample b = surface->eval(p, fresh);
     ASSERT_EQ(a.value, b.value);
-    ASSERT_EQ(a.gradient, b.gradient);
+    // A foot on an edge may be told from either of its faces, which round it differently.
+    ASSERT_LT((a.gradient - b.gradient).norm(), 1e-12);
   }
 }
 

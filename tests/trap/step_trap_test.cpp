@@ -1,5 +1,5 @@
-// Proves that `step` neither allocates, locks, throws nor touches a file, for every law: the functions that would do so are
-// replaced in this program, and count while the trap is armed.
+// Proves that `step` neither allocates, locks, throws nor touches a file, for every law: the functions that would do so
+// are replaced in this program, and count while the trap is armed.
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ F* next(const char* name) {
 }  // namespace
 
 extern "C" {
-void* __libc_malloc(std::size_t);            // NOLINT: glibc's own names
+void* __libc_malloc(std::size_t);  // NOLINT: glibc's own names
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void __libc_free(void*);
@@ -131,7 +131,9 @@ Scene scene_with(const Law& law, SearchStructure structure, double probe_radius)
   spec.kind = MesostructureKind::rings;
   spec.size = 128;
   auto maps = std::make_shared<const Mesostructure>(
-      Mesostructure::build(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline).value(), Vec2(0.01, 0.01)).value());
+      Mesostructure::build(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline).value(),
+                           Vec2(0.01, 0.01))
+          .value());
   Coat coat = Coat::build(mesh, maps, {Mapping::triplanar, Vec2::Ones()}).value();
   instance.surface = std::make_shared<const ReliefSurface>(
       MeshSurface(TriangleIndex::build(std::move(mesh), structure)), std::move(coat));
