@@ -17,6 +17,7 @@ class FixedVector {
   FixedVector() noexcept {}  // NOLINT: the storage stays uninitialised on purpose
   FixedVector(const FixedVector& other) noexcept { *this = other; }
   FixedVector& operator=(const FixedVector& other) noexcept {
+    if (this == &other) return *this;
     size_ = other.size_;
     for (std::size_t i = 0; i < size_; ++i) new (&values_[i]) T(other.values_[i]);
     return *this;

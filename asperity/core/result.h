@@ -8,6 +8,7 @@
 
 namespace asperity {
 
+/// Named cause of a failure.
 enum class ErrorCode {
   file_missing,      ///< no such file, or not readable
   file_empty,        ///< nothing in it
@@ -25,7 +26,7 @@ enum class ErrorCode {
   mismatch,          ///< two inputs do not belong together (trace and scene, map sizes)
 };
 
-/// Stable name of the cause, used in messages and `--json` ("bad_value").
+/// Stable name of the cause, used in messages and `--json` ("bad_value"). [any]
 const char* to_string(ErrorCode code);
 
 /// What went wrong, where, and what would have been accepted.
@@ -76,6 +77,7 @@ class [[nodiscard]] Result {
 
 /// Success without a value, or an Error.
 using Status = Result<std::monostate>;
+/// The Status of what went well. [any]
 inline Status success() {
   return Status(std::monostate{});
 }

@@ -28,7 +28,9 @@ struct TimedPoint {
   Vec3 position = Vec3::Zero();
 };
 
+/// Shape of the path.
 enum class StrokeType { line, raster, circle, spiral, polyline, recorded };
+/// What is held along the path: a depth or a force.
 enum class PressMode {
   depth,  ///< the probe is led at `depth` below the surface
   force,  ///< the hand presses with `normal_force`
@@ -69,6 +71,7 @@ struct StrokeSettings {
   std::optional<double> normal_smoothing;  ///< the normal is averaged over this length (m), 0 or more; default: 1/200
 };
 
+/// Where in its course a stroke is.
 enum class StrokePhase { approach, contact, lift, done };
 
 /// Where the stroke is at one time. World frame, SI.

@@ -15,6 +15,7 @@
 
 namespace asperity {
 
+/// The papers' mesostructures that can be made.
 enum class MesostructureKind {
   flat,      ///< H_0: one height throughout
   serrated,  ///< H_1,k: k ridges, steep vertical left side, sloping right side

@@ -12,6 +12,7 @@
 
 namespace asperity {
 
+/// How the hierarchy is searched.
 struct BvhSettings {
   bool plain_kernels = false;  ///< plain C++ in place of AVX2: the oracle
 };
@@ -90,7 +91,7 @@ class Bvh {
   void to_local(const Vec3& p, float local[3]) const noexcept;
   static bool reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept;
   template <class Visit>
-  void scan_leaf(std::uint32_t leaf, const float local[3], float limit, Visit& visit) const noexcept;
+  void scan_leaf(std::uint32_t index, const float local[3], float limit, Visit& visit) const noexcept;
   /// Bound on the rounding of distances from `local`, in units of scale_.
   static float rounding(const float local[3]) noexcept;
 

@@ -8,6 +8,7 @@
 
 namespace asperity {
 
+/// How far the octree divides.
 struct OctreeSettings {
   std::uint32_t max_triangles_per_leaf = 8;  ///< a cell with more is split; at least 1
   int max_depth = 16;                        ///< levels below the root cell; 0 to 20

@@ -51,8 +51,9 @@ struct SearchKernels {
   void (*triangles)(const TrianglesOf8& triangles, const float point[3], DistancesOf8& out) noexcept;
 };
 
+/// Plain C++. [any]
 const SearchKernels& plain_kernels() noexcept;
-/// The fastest kernels this processor can run.
+/// The fastest kernels this processor can run. [any]
 const SearchKernels& best_kernels() noexcept;
 
 }  // namespace asperity

@@ -10,6 +10,7 @@
 
 namespace asperity {
 
+/// Which structure answers the elementary queries.
 enum class SearchStructure { bvh, octree };
 
 /// One query interface over a mesh and either search structure. Owns both mesh and structure.

@@ -6,6 +6,7 @@
 
 namespace asperity {
 
+/// A file that the build put into the library.
 struct EmbeddedFile {
   std::string_view name;  ///< without folder: "icosphere.json"
   std::string_view text;

@@ -18,6 +18,7 @@
 
 namespace asperity {
 
+/// Who moves the probe.
 enum class ProbeKind {
   ideal,    ///< exactly on its stroke
   dynamic,  ///< a simulated hand holding a simulated device

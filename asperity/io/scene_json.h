@@ -27,10 +27,12 @@ Result<SceneJson> parse_scene_json(std::string_view text, const std::string& nam
 const char* json_type(const SceneJson& value);
 
 /// The kinds of object that a scene file may hold, and the keys of each; the published schema describes the same ones.
+/// The keys that the reader knows in one kind of object.
 struct SceneObjectKeys {
   std::string_view object;  ///< "scene", "surface", "coat": the name of its definition in the schema
   std::vector<std::string> keys;
 };
+/// All of them, for the schema's test. [any]
 const std::vector<SceneObjectKeys>& scene_object_keys();
 
 /// Interval that a number has to lie in.

@@ -40,6 +40,7 @@ Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::s
 /// Text (a preset) or object. [build]
 Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::string& place);
 
+/// The scene's `probe` object.
 struct ProbeSettings {
   bool dynamic = false;
   double radius = 0.0;   ///< m

@@ -28,7 +28,7 @@ std::string trace_sidecar_json(const Trace& trace);
 /// extension replaced by ".json". Errors: file_unwritable; bad_value when `path` itself ends in ".json". [main]
 Status export_trace(const Trace& trace, const std::string& path);
 
-/// "out/run.csv" -> "out/run.json"
+/// "out/run.csv" -> "out/run.json" [any]
 std::string sidecar_path(std::string_view csv_path);
 
 }  // namespace asperity

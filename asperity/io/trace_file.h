@@ -59,8 +59,10 @@ struct TraceMetadata {
 };
 
 /// Metadata as the JSON text that stands in the file. Text that is not UTF-8 is kept readable by replacing bad bytes.
+/// [any]
 std::string to_json(const TraceMetadata& metadata);
 
+/// How often a trace reaches the file.
 struct TraceWriterSettings {
   std::size_t records_per_frame = 256;  ///< a crash loses at most this many ticks; 1 to 65536
   bool sync_each_frame = false;  ///< true: each frame is on the disk before `append` returns (power loss); slower

@@ -94,12 +94,7 @@ BaseFoot base_foot(const ReliefSurface& surface, const Vec3& probe, Hint& hint) 
   foot.signed_distance = outside ? foot.nearest.distance : -foot.nearest.distance;
   foot.up = outside ? foot.nearest.normal : Vec3(-foot.nearest.normal);
   if (foot.nearest.distance == 0.0) foot.up = mesh.face_normal(foot.nearest.element);
-  for (int k = 0; k < 3; ++k) {
-    if (barycentric[k] > 0.0 || mesh.neighbour(foot.nearest.element, (k + 1) % 3) != no_index) continue;
-    // On the rim: straight over the face still counts, beside it does not.
-    const Vec3 face_normal = mesh.face_normal(foot.nearest.element);
-    if ((offset - offset.dot(face_normal) * face_normal).norm() > surface.skin()) foot.beyond_rim = true;
-  }
+  foot.beyond_rim = beyond_rim(mesh, foot.nearest, probe, surface.skin());
   return foot;
 }
 

@@ -63,6 +63,7 @@ const std::vector<std::string>& law_names();
 Status validate(const Law& law);
 
 /// Whether the law takes part in the joint constraint solve (it moves the proxy) rather than adding a force of its own.
+/// [any]
 constexpr bool constrains(const Law& law) noexcept {
   return std::holds_alternative<GodObjectLaw>(law) || std::holds_alternative<ForceShadingLaw>(law);
 }

@@ -15,6 +15,7 @@
 
 namespace asperity {
 
+/// Period and length of a session.
 struct SessionSettings {
   Seconds dt{0.001};                       ///< period of the loop, above 0
   std::uint64_t max_ticks = 10'000'000;    ///< the session ends here, or earlier when the device has finished
@@ -31,14 +32,14 @@ struct SessionSummary {
   double step_seconds = 0.0;  ///< time spent in `step`, all ticks; a measurement
 };
 
-/// Ticks of length `dt` that cover `duration`, its end included.
+/// Ticks of length `dt` that cover `duration`, its end included. [any]
 inline std::uint64_t session_ticks(Seconds duration, Seconds dt) {
   return static_cast<std::uint64_t>(std::floor(std::max(0.0, duration.count() / dt.count()) * (1.0 + 1e-12))) + 1;
 }
 
 namespace detail {
 
-/// Calls `record`; false when it answered false.
+/// Calls `record`; false when it answered false. [servo]
 template <class Record>
 bool keep_going(Record& record, const TraceRecord& tick) {
   if constexpr (std::is_convertible_v<std::invoke_result_t<Record&, const TraceRecord&>, bool>) {
@@ -49,7 +50,7 @@ bool keep_going(Record& record, const TraceRecord& tick) {
   }
 }
 
-/// Runs `step` and puts its answer and the time it took into `tick`.
+/// Runs `step` and puts its answer and the time it took into `tick`. [servo]
 template <class Step>
 void timed_step(Step& step, TraceRecord& tick) {
   const auto begin = std::chrono::steady_clock::now();

@@ -83,6 +83,7 @@ struct TickMetrics {
   double largest_intervention = 0.0;       ///< largest |rendered - commanded| (N)
 };
 
+/// The numbers of one run.
 struct RunMetrics {
   TickMetrics ticks;
   ForceMetrics force;

@@ -14,6 +14,7 @@
 
 namespace asperity {
 
+/// Size and cost of a picture.
 struct PictureSettings {
   int width = 900;      ///< pixels, 16 to 4096
   int height = 600;     ///< pixels, 16 to 4096

@@ -51,17 +51,10 @@ Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& dire
 }
 
 /// Whether a point over an open mesh lies beside its rim: the implicit relief goes on there, what is felt does not.
-bool beyond_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
+bool beside_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
   const Foot foot = surface.base().closest(point, infinity, hint);
   if (!foot.found()) return true;
-  const TriangleMesh& mesh = surface.base().mesh();
-  const Vec3 normal = mesh.face_normal(foot.element);
-  const Vec3 offset = point - foot.point;
-  for (int k = 0; k < 3; ++k) {
-    if (foot.barycentric[k] > 0.0 || mesh.neighbour(foot.element, (k + 1) % 3) != no_index) continue;
-    if ((offset - offset.dot(normal) * normal).norm() > surface.skin()) return true;
-  }
-  return false;
+  return asperity::beyond_rim(surface.base().mesh(), foot, point, surface.skin());
 }
 
 /// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is
@@ -75,7 +68,7 @@ Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& di
     const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
     if (!hit.hit) return {};
     const double t = part.from + hit.t * (part.to - part.from);
-    if (!open || !beyond_rim(surface, origin + t * direction, hint)) return {t, hit.contact.normal};
+    if (!open || !beside_rim(surface, origin + t * direction, hint)) return {t, hit.contact.normal};
     part.from = t + 10.0 * after;
   }
   return {};

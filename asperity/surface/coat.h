@@ -15,6 +15,7 @@ namespace asperity {
 ///              smooth normal's components: continuous over every edge, no UVs needed
 enum class Mapping { per_face, uv, triplanar };
 
+/// How a mesostructure lies on a mesh.
 struct CoatSettings {
   Mapping mapping = Mapping::uv;
   Vec2 repeat = Vec2::Ones();  ///< uv and per_face: how often the map fits into one unit of texture coordinate, above 0

@@ -21,6 +21,40 @@ Vec3 pseudonormal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& bary
   return own;
 }
 
+namespace {
+
+bool boundary_vertex(const TriangleMesh& mesh, std::uint32_t vertex) noexcept {
+  for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+    for (int edge = 0; edge < 3; ++edge) {
+      const TriangleMesh::Triangle& corners = mesh.triangles()[face];
+      const bool touches = corners[static_cast<std::size_t>(edge)] == vertex ||
+                           corners[static_cast<std::size_t>((edge + 1) % 3)] == vertex;
+      if (touches && mesh.neighbour(face, edge) == no_index) return true;
+    }
+  }
+  return false;
+}
+
+bool on_boundary(const TriangleMesh& mesh, const Foot& foot) noexcept {
+  for (int k = 0; k < 3; ++k) {
+    if (foot.barycentric[k] >= 1.0)
+      return boundary_vertex(mesh, mesh.triangles()[foot.element][static_cast<std::size_t>(k)]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (foot.barycentric[k] <= 0.0 && mesh.neighbour(foot.element, (k + 1) % 3) == no_index) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool beyond_rim(const TriangleMesh& mesh, const Foot& foot, const Vec3& probe, double skin) noexcept {
+  if (foot.barycentric.minCoeff() > 0.0 || !on_boundary(mesh, foot)) return false;
+  const Vec3 normal = mesh.face_normal(foot.element);
+  const Vec3 offset = probe - foot.point;
+  return (offset - offset.dot(normal) * normal).norm() > skin;
+}
+
 Vec3 interpolated_normal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept {
   const TriangleMesh::Triangle& corners = mesh.triangles()[face];
   const Vec3 sum = barycentric[0] * mesh.vertex_normal(corners[0]) + barycentric[1] * mesh.vertex_normal(corners[1]) +

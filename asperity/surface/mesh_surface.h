@@ -40,6 +40,11 @@ static_assert(SurfaceQuery<MeshSurface>);
 /// outside exactly (angle-weighted pseudonormals: Baerentzen and Aanaes 2005). Not unit on edges. [servo]
 Vec3 pseudonormal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept;
 
+/// Whether `probe`, whose nearest point on the mesh is this, lies beside the rim of an open mesh: its foot is on a
+/// boundary edge or vertex, and it is not straight over the face. There a relief ends (formulation, amendment 3).
+/// [servo]
+bool beyond_rim(const TriangleMesh& mesh, const Foot& foot, const Vec3& probe, double skin) noexcept;
+
 /// Vertex normals interpolated over a face, unit: the smooth normal of force shading. [servo]
 Vec3 interpolated_normal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept;
 

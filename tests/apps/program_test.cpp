@@ -98,7 +98,7 @@ TEST_F(Program, TouchWritesTraceNumbersAndReport) {
   const Call call = run("touch quick.json");
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_LE(std::count(call.out.begin(), call.out.end(), '\n'), 12);
-  for (const char* part : {"quick", "mesostructure", "force", "height", "p99.9", "flags", "out/quick/report.html"})
+  for (const char* part : {"quick", "height-field", "force", "height", "p99.9", "flags", "out/quick/report.html"})
     EXPECT_TRUE(has(call.out, part)) << part;
   const std::string page = read("out/quick/report.html");
   EXPECT_TRUE(has(page, "<html")) << page.size();
@@ -134,7 +134,7 @@ TEST_F(Program, AMeshAndAMapAreEnough) {
           "--device omega.7 --force 1N");
   ASSERT_EQ(relief.code, 0) << relief.err;
   const json document = json::parse(relief.out);
-  EXPECT_EQ(document["law"], "mesostructure");
+  EXPECT_EQ(document["law"], "height-field");
   EXPECT_EQ(document["scene"], "ball");
   EXPECT_TRUE(has(document["setup"]["stroke"].get<std::string>(), "pressed with 1 N"));
   EXPECT_TRUE(has(document["setup"]["device"].get<std::string>(), "omega.7"));
