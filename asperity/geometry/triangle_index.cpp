@@ -23,6 +23,8 @@ constexpr double same_plane_cosine = 1.0 - 1e-10;
 // Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
 constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
+// The first part of a longer motion that is looked at by itself.
+constexpr double first_look_in_edges = 0.25;
 // A ball that moves by less than this share of its radius between two places where nothing reaches into it cannot have
 // passed anything: on the way a triangle comes nearer than at both ends by at most an eighth of length^2 / radius.
 constexpr double glide_of_radius = 0.25;
@@ -233,6 +235,18 @@ bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, doubl
 }
 
 SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
+  const Vec3 direction = motion.to - motion.from;
+  const double first_part = first_look_in_edges * mesh_->mean_edge() / direction.norm();
+  if (first_part >= 0.5) return sweep_part(motion, radius, sides, patch);
+  // A probe that leaves one face usually drops right onto the next: look near before searching the whole way.
+  SweptHit hit = sweep_part({motion.from, motion.from + first_part * direction}, radius, sides, patch);
+  if (!hit.hit) return sweep_part(motion, radius, sides, patch);
+  hit.t *= first_part;
+  return hit;
+}
+
+SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides sides,
+                                   TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
   const double length = direction.norm();
   const double grown = radius + stopped_in_skins * skin_;

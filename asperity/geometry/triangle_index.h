@@ -63,6 +63,8 @@ class TriangleIndex {
   void scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept;
   /// Bound on the error of the distances that scan_ball gives (m).
   [[nodiscard]] double error(const Vec3& position) const noexcept;
+  [[nodiscard]] SweptHit sweep_part(const Segment& motion, double radius, Sides sides,
+                                    TrianglePatch& patch) const noexcept;
   /// Whether nothing reaches into the ball at the end of a short motion; if so, remembers what it touches there.
   bool glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept;
   /// Makes of the edges and corners among the contacts what they mean beside a touched face.
