@@ -86,9 +86,10 @@ Result<double> parse_quantity(std::string_view text, Dimension dimension) {
 std::string format_length(double metres) {
   const double size = std::abs(metres);
   if (size == 0.0) return "0 mm";
-  if (size >= 1.0) return fmt::format("{:.3g} m", metres);
-  if (size >= 1e-3) return fmt::format("{:.3g} mm", metres * 1e3);
-  if (size >= 1e-6) return fmt::format("{:.3g} um", metres * 1e6);
+  // Three digits that round up to 1000 belong to the next unit.
+  if (size >= 0.9995) return fmt::format("{:.3g} m", metres);
+  if (size >= 0.9995e-3) return fmt::format("{:.3g} mm", metres * 1e3);
+  if (size >= 0.9995e-6) return fmt::format("{:.3g} um", metres * 1e6);
   return fmt::format("{:.3g} nm", metres * 1e9);
 }
 

@@ -218,11 +218,11 @@ std::optional<std::string> disagreement_warning(const NormalAgreement& a) {
   if (a.green_flipped_fits_better) {
     return fmt::format(
         "the normal map fits the heights turned over and with its green channel the other way round {}: try "
-        "the other setting of white_is_deep and the other green convention",
+        "the other setting of white_is and the other green convention",
         numbers);
   }
   if (best < 0.0) {
-    return fmt::format("the normal map fits the heights turned over {}: try the other setting of white_is_deep",
+    return fmt::format("the normal map fits the heights turned over {}: try the other setting of white_is",
                        numbers);
   }
   return fmt::format("the normal map only loosely follows the heights {}", numbers);

@@ -38,6 +38,7 @@ TEST(Units, LengthsAreWrittenWithTheUnitThatSuits) {
   EXPECT_EQ(format_length(3.5e-4), "350 um");
   EXPECT_EQ(format_length(1.5), "1.5 m");
   EXPECT_EQ(format_length(-2.1e-8), "-21 nm");
+  EXPECT_EQ(format_length(0.9999e-3), "1 mm");
   EXPECT_EQ(format_length(0.0), "0 mm");
 }
 
