@@ -22,10 +22,13 @@ constexpr int fewest_blocks_a_side = 16;
 /// Steepest slope that a given normal is read as; 8 bits tell no more.
 constexpr double least_outward = 1.0 / 127.0;
 
+// Below this a slope of the relief could leave the range of a double, and with it a force (m).
+constexpr double least_tile = 1e-12;
+
 Status check_tile(const Vec2& tile) {
-  if (tile.allFinite() && tile.minCoeff() > 0.0) return success();
+  if (tile.allFinite() && tile.minCoeff() >= least_tile) return success();
   return Error{ErrorCode::bad_value, fmt::format("the tile is {} m by {} m", tile.x(), tile.y()), "", "tile",
-               "two finite lengths above 0"};
+               "two finite lengths of at least 1e-12 m"};
 }
 
 /// Slopes of the heights (m/m) by central differences over two texels, whatever the reconstruction.

@@ -28,7 +28,7 @@ struct MesostructureSample {
 /// given normal map the normals are those of the reconstructed heights at the very point asked. Immutable.
 class Mesostructure {
  public:
-  /// `tile` is the size of one repeat of the map (m). Errors: bad_value when it is not above 0 and finite. [build]
+  /// `tile` is the size of one repeat of the map (m). Errors: bad_value when it is below 1e-12 m or not finite. [build]
   static Result<Mesostructure> build(HeightMap heights, const Vec2& tile);
   /// The same with normals of their own; the maps may differ in size, not in wrap (mismatch). [build]
   static Result<Mesostructure> build(HeightMap heights, NormalMap normals, const Vec2& tile);

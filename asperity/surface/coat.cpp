@@ -11,6 +11,9 @@ namespace asperity {
 
 namespace {
 
+// More repeats than this would make slopes that no double, let alone a hand, can follow.
+constexpr double most_repeats = 1e9;
+
 struct TextureFrame {
   Vec2 st;          ///< texture coordinates
   Vec3 gradient_s;  ///< of s over the surface (1/m)
@@ -71,12 +74,12 @@ BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face)
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
                          const CoatSettings& settings) {
-  if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0) {
+  if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0 || settings.repeat.maxCoeff() > most_repeats) {
     return Error{ErrorCode::bad_value,
                  fmt::format("is {} x {}", settings.repeat.x(), settings.repeat.y()),
                  {},
                  "repeat",
-                 "numbers above 0"};
+                 "numbers above 0, at most 1e9"};
   }
   if (settings.mapping == Mapping::uv && !mesh.has_uvs()) {
     return Error{ErrorCode::mismatch,

@@ -84,7 +84,7 @@ TEST(MesostructureSampling, UsesTheGivenNormalMap) {
 TEST(MesostructureBadInput, IsRefused) {
   const HeightMap heights = relief(MesostructureKind::rings);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const Vec2& bad : {Vec2(0.0, 1.0), Vec2(1.0, -2.0), Vec2(1.0, nan), Vec2(infinity, 1.0)}) {
+  for (const Vec2& bad : {Vec2(1e-323, 1e-3), Vec2(0.0, 1.0), Vec2(1.0, -2.0), Vec2(1.0, nan), Vec2(infinity, 1.0)}) {
     EXPECT_EQ(Mesostructure::build(heights, bad).error().place, "tile");
     EXPECT_EQ(Mesostructure::build(heights, flat_normals(), bad).error().place, "tile");
   }
