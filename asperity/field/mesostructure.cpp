@@ -225,8 +225,7 @@ std::optional<std::string> disagreement_warning(const NormalAgreement& a) {
         numbers);
   }
   if (best < 0.0) {
-    return fmt::format("the normal map fits the heights turned over {}: try the other setting of white_is",
-                       numbers);
+    return fmt::format("the normal map fits the heights turned over {}: try the other setting of white_is", numbers);
   }
   return fmt::format("the normal map only loosely follows the heights {}", numbers);
 }

@@ -379,10 +379,10 @@ TEST(RealMaps, PairsAgreeAndEachWrongSettingGetsItsHint) {
     const auto green = disagreement_warning(compare(heights, normals, pair.white_is_deep, GreenConvention::down));
     ASSERT_TRUE(green.has_value());
     EXPECT_NE(green->find("green convention"), std::string::npos) << *green;
-    EXPECT_EQ(green->find("white_is_deep"), std::string::npos) << *green;
+    EXPECT_EQ(green->find("white_is"), std::string::npos) << *green;
     const auto inverted = disagreement_warning(compare(heights, normals, !pair.white_is_deep, GreenConvention::up));
     ASSERT_TRUE(inverted.has_value());
-    EXPECT_NE(inverted->find("white_is_deep"), std::string::npos) << *inverted;
+    EXPECT_NE(inverted->find("white_is"), std::string::npos) << *inverted;
     EXPECT_EQ(inverted->find("green"), std::string::npos) << *inverted;
   }
 }
