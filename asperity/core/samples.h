@@ -18,10 +18,11 @@ struct ProbeSample {
 
 /// Status of one tick. Bits, because several can hold at once.
 enum class TickFlag : std::uint32_t {
-  contact = 1u << 0,            ///< a surface pushes on the probe
-  not_converged = 1u << 1,      ///< the constraint solve used its whole budget; the proxy is feasible, not yet optimal
-  started_inside = 1u << 2,     ///< the probe began inside an object and has not left it yet; force withheld
-  input_not_finite = 1u << 3,   ///< the probe sample held a NaN or an infinity; the last force was not continued
+  contact = 1u << 0,         ///< a surface pushes on the probe
+  not_converged = 1u << 1,   ///< the constraint solve used its whole budget; the proxy is feasible, not yet optimal
+  started_inside = 1u << 2,  ///< the probe began inside an object and has not left it yet; force withheld
+  input_not_finite =
+      1u << 3,  ///< the probe sample held a NaN, an infinity or a place 1,000 km away; the last force was not continued
   force_limited = 1u << 4,      ///< the safety stage clamped the magnitude
   slew_limited = 1u << 5,       ///< the safety stage limited the change per second
   output_not_finite = 1u << 6,  ///< the safety stage replaced a force that was not finite by zero

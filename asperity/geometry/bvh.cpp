@@ -11,6 +11,9 @@ constexpr std::uint32_t leaf_size = 8;
 constexpr int bin_count = 16;
 // Below this depth ranges are halved by position whatever the area: it bounds the traversal stack.
 constexpr int balanced_depth = 20;
+// From so far away (in sizes of the mesh) single precision tells no two triangles apart, and its squares leave their
+// range.
+constexpr float far_rounding = 1e5F;
 
 struct Primitive {
   float lower[3];
@@ -265,14 +268,27 @@ Bvh Bvh::build(const TriangleMesh& mesh, const BvhSettings& settings) {
   return bvh;
 }
 
+ClosestHit Bvh::closest_from_afar(const Vec3& p, double bound) const noexcept {
+  ClosestHit best;
+  for (std::uint32_t face = 0; face < mesh_->triangles().size(); ++face) {
+    const auto [a, b, c] = mesh_->corners(face);
+    const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
+    if (point.squared_distance <= bound * bound && point.squared_distance < best.point.squared_distance)
+      best = {face, point};
+  }
+  return best;
+}
+
 ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
   ClosestHit best;
   if (nodes_.empty() || !(bound >= 0.0)) return best;
   float local[3];
   to_local(p, local);
   const float error = rounding(local);
+  if (!(error < far_rounding)) return closest_from_afar(p, bound);
   double best_squared = bound * bound;
-  float limit = std::isfinite(bound) ? static_cast<float>(bound / scale_) * 1.000001F + error : 1e15F;
+  // Clamped, so that its square stays a float: no distance from here comes near.
+  float limit = std::min(static_cast<float>(std::min(bound * per_scale_, 1e15)) * 1.000001F + error, 1e15F);
   Entry stack[stack_capacity];
   int top = 0;
   stack[top++] = {0.0F, 0};
@@ -301,6 +317,7 @@ ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
     const int first = top;
     for (; mask != 0; mask &= mask - 1) {
       const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+      if (node.child[i] == empty_child) continue;
       int slot = top++;
       for (; slot > first && stack[slot - 1].key < squared[i]; --slot) stack[slot] = stack[slot - 1];
       stack[slot] = {squared[i], node.child[i]};
@@ -384,6 +401,7 @@ void Bvh::gather(const Vec3& centre, double reach, std::uint64_t owner, Triangle
     const int first = top;
     for (; mask != 0; mask &= mask - 1) {
       const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+      if (node.child[i] == empty_child) continue;
       if ((node.child[i] & leaf_bit) != 0) {
         nearest.offer({squared[i], node.child[i] & ~leaf_bit});
         continue;

@@ -89,6 +89,7 @@ class Bvh {
   class Builder;
 
   void to_local(const Vec3& p, float local[3]) const noexcept;
+  [[nodiscard]] ClosestHit closest_from_afar(const Vec3& p, double bound) const noexcept;
   static bool reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept;
   template <class Visit>
   void scan_leaf(std::uint32_t index, const float local[3], float limit, Visit& visit) const noexcept;
@@ -169,6 +170,7 @@ void Bvh::scan(const Vec3& p, double reach, Visit&& visit) const noexcept {
     unsigned mask = kernels_->boxes(node.boxes, local, limit * limit, squared);
     for (; mask != 0; mask &= mask - 1) {
       const std::uint32_t child = node.child[__builtin_ctz(mask)];
+      if (child == empty_child) continue;
       if ((child & leaf_bit) == 0) {
         stack[top++] = child;
       } else if (reaches(cylinders_[child & ~leaf_bit], local, limit)) {
@@ -246,6 +248,7 @@ void Bvh::for_each_along(const Segment& segment, double radius, Visit&& visit) c
     const int first = top;
     for (; mask != 0; mask &= mask - 1) {
       const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+      if (node.child[i] == empty_child) continue;
       int slot = top++;
       for (; slot > first && stack[slot - 1].key < keys[i]; --slot) stack[slot] = stack[slot - 1];
       stack[slot] = {keys[i], node.child[i]};

@@ -81,8 +81,11 @@ LawForce added_force(const Instance& instance, const ProbeSample& probe, const V
 }
 
 bool finite(const ProbeSample& probe) noexcept {
-  return probe.pose.position.allFinite() && probe.pose.orientation.coeffs().allFinite() &&
-         probe.twist.linear.allFinite() && probe.twist.angular.allFinite();
+  // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
+  constexpr double farthest = 1e6;
+  return probe.pose.position.cwiseAbs().maxCoeff() < farthest && probe.pose.position.allFinite() &&
+         probe.pose.orientation.coeffs().allFinite() && probe.twist.linear.allFinite() &&
+         probe.twist.angular.allFinite();
 }
 
 }  // namespace

@@ -54,6 +54,19 @@ TEST(Bvh, ClosestEqualsBruteForceOnEveryKindOfMesh) {
   }
 }
 
+TEST(Bvh, ClosestAnswersFromAnyDistance) {
+  const TriangleMesh mesh = TriangleMesh::build(random_closed_mesh(3, 1, 0.05, 0.3)).value();
+  for (const bool plain : {false, true}) {
+    const Bvh bvh = Bvh::build(mesh, {plain});
+    for (double far = 1.0; far < 1e150; far *= 1e3) {
+      const Vec3 p(0.3 * far, far, -0.1 * far);
+      EXPECT_EQ(bvh.closest(p, infinity).point.squared_distance, brute_squared_distance(mesh, p)) << far;
+      EXPECT_EQ(bvh.closest(p, 0.5 * far).face, no_index) << far;
+      EXPECT_NE(bvh.closest(p, 1e3 * far).face, no_index) << far;
+    }
+  }
+}
+
 TEST(Bvh, ClosestKeepsItsBound) {
   Rng rng(2);
   const TriangleMesh mesh = TriangleMesh::build(random_closed_mesh(3, 3, 0.05, 0.4)).value();

@@ -290,7 +290,7 @@ TEST(GodObject, ProbeThatIsNotFiniteGivesNoForceAndKeepsTheState) {
   step(scene, state, at(Vec3(0.0, 0.06, 0.0)), tick);
   step(scene, state, at(Vec3(0.0, 0.045, 0.0)), tick);
   const Vec3 before = state.proxy;
-  for (const double bad : {std::nan(""), infinity, -infinity}) {
+  for (const double bad : {std::nan(""), infinity, -infinity, 1e20, -1e300}) {
     const ForceSample force = step(scene, state, at(Vec3(0.0, bad, 0.0)), tick);
     EXPECT_TRUE(force.flags.has(TickFlag::input_not_finite));
     EXPECT_EQ(force.wrench.force.norm(), 0.0);
