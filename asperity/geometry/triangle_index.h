@@ -47,7 +47,9 @@ class TriangleIndex {
   }
 
   /// First touch of a ball of `radius` (m, plus skin) moving along `motion`. Triangles seen from behind at the start
-  /// are passed through when `sides` is front. [servo]
+  /// are passed through when `sides` is front. A ball's motion
+  /// shorter than a quarter of its radius is judged at its end: on the way a triangle may come nearer than at both ends
+  /// by at most length^2 / (8 radius), and cannot be passed. [servo]
   [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept;
   /// Every distinct plane that a ball of `radius` (m) resting at `position` touches within two skins. [servo]
   void contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch, ContactSet& out) const noexcept;
