@@ -31,11 +31,12 @@ void say(const std::string& what) {
 Status measure_all(const Options& options, Report& report) {
   Effort effort{options.updates, options.cold_updates, 5};
   std::vector<int> meshes = {3, 5, 6, 7, 8};
-  std::vector<int> reliefs = {0, 3, 6};
+  std::vector<int> reliefs = {0, 3, 5, 6, 8};
   int map_size = 1024;
   if (options.quick) {
     effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
     meshes = {3, 5, 6};
+    reliefs = {0, 3, 6};
     map_size = 256;
   }
   for (const int subdivisions : meshes) {

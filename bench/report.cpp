@@ -31,13 +31,16 @@ void add_relief_ratios(std::vector<Ratio>& ratios, const std::vector<Group>& gro
   for (const RowResult& row : first->rows) {
     double least = row.warm.p50;
     double most = row.warm.p50;
+    std::size_t bases = 0;
     for (const Group& group : groups) {
       const RowResult* same = group.kind == "relief" ? group.row(row.name) : nullptr;
       if (same == nullptr) continue;
+      ++bases;
       least = std::min(least, same->warm.p50);
       most = std::max(most, same->warm.p50);
     }
-    if (least > 0.0) ratios.push_back({fmt::format("{}: dearest / cheapest base", row.name), most / least, 1.5, 15.0});
+    if (least > 0.0 && bases > 2)
+      ratios.push_back({fmt::format("{}: dearest / cheapest base", row.name), most / least, 1.5, 15.0});
   }
 }
 
@@ -98,6 +101,7 @@ std::vector<Ratio> Report::ratios() const {
     add_ratio(ratios, group, god_object_point, embree_bounded, 0.0, 6.0);
     add_ratio(ratios, group, god_object_radius, god_object_point, 1.5, 6.0);
     add_ratio(ratios, group, closest_coherent, embree_bounded, 0.0, 4.0);
+    add_ratio(ratios, group, proxy_edge, proxy_inside, 2.0, 20.0);
   }
   add_relief_ratios(ratios, groups);
   return ratios;

@@ -19,6 +19,10 @@ inline constexpr const char* closest_anew = "closest(), no patch, infinite bound
 inline constexpr const char* embree_infinite = "Embree, infinite start radius";
 inline constexpr const char* embree_bounded = "Embree, 3 mm start radius";
 
+inline constexpr const char* proxy_cosine = "proxy, cosine, UVs";
+inline constexpr const char* proxy_inside = "proxy, per face, inside a face";
+inline constexpr const char* proxy_edge = "proxy, per face, along an edge";
+
 /// What was measured on one mesh.
 struct Group {
   std::string kind;  ///< "mesh" or "relief"
@@ -27,7 +31,7 @@ struct Group {
   double search_build_seconds = 0.0;  ///< our hierarchy
   double embree_build_seconds = 0.0;  ///< 0 where Embree takes no part
   double bytes_per_triangle = 0.0;    ///< mesh (UVs included) and search structure; without coat
-  std::size_t coat_bytes = 0;         ///< heights; 0 without a coat
+  std::size_t coat_bytes = 0;         ///< heights, shell directions and bands; 0 without a coat
   double largest_disagreement = 0.0;  ///< m, between our distance and Embree's over the whole slide
   std::vector<RowResult> rows;
 
@@ -38,8 +42,9 @@ struct Group {
 /// An icosphere of 20 * 4^subdivisions triangles as it is: god-object, closest point, Embree. [build]
 Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_cost);
 
-/// The same mesh with an H_3 coat of map_size x map_size texels and 1 mm, laid on by longitude and latitude so that
-/// every mesh wears the same relief, and triplanar: height-field and mesostructure law. [build]
+/// The same mesh with coats of map_size x map_size texels, by six charts of UVs and triplanar: the cosine of the relief
+/// test (0.30 mm from trough to crest, 4.9 mm long) and H_1 with its walls; proxy law with friction 0.3 / 0.2, and the
+/// consistent forms of Algorithms 1 and 2. On the two coarsest meshes also near an edge against inside a face. [build]
 Result<Group> measure_relief(int subdivisions, int map_size, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

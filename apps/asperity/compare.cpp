@@ -27,9 +27,9 @@ struct CompareOptions {
 
 std::vector<std::string> default_laws(const Scene& scene) {
   for (const Instance& instance : scene.instances()) {
-    if (instance.surface.index() == 0) return {"god-object", "force-shading"};
+    if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
   }
-  return {"force-shading", "height-field", "mesostructure"};
+  return {"proxy", "mesostructure", "height-field", "force-shading"};
 }
 
 /// A law run on the scene, with what a table shows of it.
@@ -146,7 +146,7 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
       "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "
       "time of one tick.\n"
       "Examples:\n"
-      "  asperity compare M_a-H_3 --laws force-shading,height-field,mesostructure\n"
+      "  asperity compare M_a-H_3 --laws proxy,mesostructure,force-shading\n"
       "  asperity compare groove --laws mesostructure-literal,mesostructure\n"
       "  asperity compare bunny.obj --relief rock.png --height 1mm --json");
   command->callback(

@@ -17,7 +17,7 @@ constexpr const char* examples =
     "  asperity touch                                   touch the built-in scene, write a report\n"
     "  asperity touch bunny.obj                         touch a mesh as it is\n"
     "  asperity touch bunny.obj --relief rock.png --height 2mm\n"
-    "  asperity compare M_a-H_3 --laws force-shading,mesostructure\n"
+    "  asperity compare M_a-H_3 --laws proxy,mesostructure\n"
     "  asperity inspect rock.png --device touch         what it is, and what can be felt of it\n"
     "  asperity replay out/icosphere-relief/trace.asptrace\n"
     "  asperity COMMAND --help                          teaches one command\n"

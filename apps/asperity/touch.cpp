@@ -189,8 +189,10 @@ CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
   auto options = std::make_shared<TouchOptions>();
   add_scene_options(*command, options->scene);
   command
-      ->add_option("--law", options->scene.law,
-                   "Of every surface: god-object, force-shading, height-field, mesostructure; -literal as printed")
+      ->add_option(
+          "--law", options->scene.law,
+          "Of every surface: proxy, god-object, force-shading, height-field, mesostructure, generated-geometry, "
+          "dense-mesh; -literal as printed")
       ->group("Touch");
   command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE");
   command->add_flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");

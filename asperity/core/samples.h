@@ -28,6 +28,8 @@ enum class TickFlag : std::uint32_t {
   output_not_finite = 1u << 6,  ///< the safety stage replaced a force that was not finite by zero
   contacts_dropped =
       1u << 7,  ///< more instances within reach than a probe can hold at once; the farther ones are not felt
+  energy_limited =
+      1u << 8,  ///< the contact's spring would have gained energy from a change of the scene, and was softened
 };
 
 /// A set of TickFlag.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <string>
@@ -74,39 +75,7 @@ Status check(const std::vector<float>& heights, int width, int height) {
   return success();
 }
 
-struct Bounds {
-  double low = infinity;
-  double high = -infinity;
-  void include(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-};
-
-Bounds bounds_of(const std::vector<float>& values) {
-  Bounds bounds;
-  for (const float value : values) bounds.include(value);
-  return bounds;
-}
-
-/// Bounds of the spline by the coefficients of the same spline on a grid twice as fine (Chaikin's rule, weights 3/4 and
-/// 1/4 along each axis): a spline lies within its coefficients, and finer ones lie closer to it.
-Bounds spline_bounds(const std::vector<float>& coefficients, std::size_t stride) {
-  Bounds bounds;
-  for (std::size_t row = stride; row < coefficients.size(); row += stride) {
-    for (std::size_t i = row + 1; i < row + stride; ++i) {
-      const double a = coefficients[i - stride - 1];
-      const double b = coefficients[i - stride];
-      const double c = coefficients[i - 1];
-      const double d = coefficients[i];
-      bounds.include((9.0 * a + 3.0 * b + 3.0 * c + d) / 16.0);
-      bounds.include((3.0 * a + 9.0 * b + c + 3.0 * d) / 16.0);
-      bounds.include((3.0 * a + b + 9.0 * c + 3.0 * d) / 16.0);
-      bounds.include((a + 3.0 * b + 3.0 * c + 9.0 * d) / 16.0);
-    }
-  }
-  return bounds;
-}
+using Three = std::array<double, 3>;
 
 /// The three weights of a quadratic B-spline at `offset` texels (-0.5 to 0.5) from the middle knot, as multiples of the
 /// differences to that knot, so that a flat neighbourhood answers exactly its height and slope 0.
@@ -120,13 +89,68 @@ struct SplineWeights {
         after(0.5 * (0.5 + offset) * (0.5 + offset)),
         slope_before(0.5 - offset),
         slope_after(0.5 + offset) {}
-  [[nodiscard]] double value(double a, double b, double c) const noexcept {
-    return b + before * (a - b) + after * (c - b);
+  [[nodiscard]] double value(const Three& at) const noexcept {
+    return at[1] + before * (at[0] - at[1]) + after * (at[2] - at[1]);
   }
-  [[nodiscard]] double slope(double a, double b, double c) const noexcept {
-    return slope_before * (b - a) + slope_after * (c - b);
+  [[nodiscard]] double slope(const Three& at) const noexcept {
+    return slope_before * (at[1] - at[0]) + slope_after * (at[2] - at[1]);
+  }
+  [[nodiscard]] double bend(const Three& at) const noexcept { return (at[2] - at[1]) - (at[1] - at[0]); }
+};
+
+/// The spline's piece in one texel: its 3 x 3 coefficients and the place between them. Each function answers, for the
+/// three rows, what becomes of them along s.
+struct SplinePiece {
+  SplineWeights in_s;
+  SplineWeights in_t;
+  Three rows[3];
+  SplinePiece(const StoredTexels& texels, Wrap wrap, const Vec2& st) noexcept
+      : SplinePiece(texels, texel_under(unit_coordinate(st.x(), wrap), texels.width),
+                    texel_under(unit_coordinate(st.y(), wrap), texels.height)) {}
+  SplinePiece(const StoredTexels& texels, const TexelPlace& s, const TexelPlace& t) noexcept
+      : in_s(s.offset), in_t(t.offset) {
+    const std::size_t stride = static_cast<std::size_t>(texels.width) + 2;
+    const float* from = texels.values + static_cast<std::size_t>(t.index) * stride + static_cast<std::size_t>(s.index);
+    for (Three& row : rows) {
+      row = {from[0], from[1], from[2]};
+      from += stride;
+    }
+  }
+  [[nodiscard]] Three heights() const noexcept {
+    return {in_s.value(rows[0]), in_s.value(rows[1]), in_s.value(rows[2])};
+  }
+  [[nodiscard]] Three slopes() const noexcept {
+    return {in_s.slope(rows[0]), in_s.slope(rows[1]), in_s.slope(rows[2])};
+  }
+  [[nodiscard]] Three bends() const noexcept { return {in_s.bend(rows[0]), in_s.bend(rows[1]), in_s.bend(rows[2])}; }
+};
+
+/// The piece of bilinear reconstruction between four texel centres, read along s at the lower pair and at the upper.
+struct BilinearPiece {
+  double fraction = 0.0;  // of the way from the lower pair to the upper
+  double height_below = 0.0;
+  double height_above = 0.0;
+  double slope_below = 0.0;
+  double slope_above = 0.0;
+  BilinearPiece(const StoredTexels& texels, Wrap wrap, const Vec2& st) noexcept {
+    const TexelPair s = texels_around(unit_coordinate(st.x(), wrap), texels.width);
+    const TexelPair t = texels_around(unit_coordinate(st.y(), wrap), texels.height);
+    const std::size_t stride = static_cast<std::size_t>(texels.width) + 2;
+    const float* below =
+        texels.values + static_cast<std::size_t>(t.lower + 1) * stride + static_cast<std::size_t>(s.lower + 1);
+    const float* above = below + stride;
+    fraction = t.fraction;
+    slope_below = static_cast<double>(below[1]) - below[0];
+    slope_above = static_cast<double>(above[1]) - above[0];
+    height_below = below[0] + s.fraction * slope_below;
+    height_above = above[0] + s.fraction * slope_above;
   }
 };
+
+/// Whether the map is clamped at this coordinate, so that nothing changes along it.
+bool lies_outside(double coordinate, Wrap wrap) noexcept {
+  return wrap == Wrap::clamp && (coordinate < 0.0 || coordinate > 1.0) && std::isfinite(coordinate);
+}
 
 }  // namespace
 
@@ -195,17 +219,19 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
     for (std::size_t x = 0; x < width; ++x) to[x] = static_cast<float>(from[x]);
   }
   fill_texel_apron(values_.data(), width_, height_, wrap_);
-  const Bounds bounds =
-      reconstruction_ == Reconstruction::quadratic_bspline ? spline_bounds(values_, stride_) : bounds_of(values_);
+  ranges_ = RangePyramid(stored());
+  const HeightRange bounds = ranges_.whole();
   // A weighted mean in floating point may leave the interval of its terms by rounding.
-  const double rounding = 1e-15 * (std::abs(base_) + std::abs(bounds.low) + std::abs(bounds.high));
-  const double margin = bounds.low < bounds.high ? rounding : 0.0;
-  lowest_ = base_ + bounds.low - margin;
-  highest_ = base_ + bounds.high + margin;
+  const double size = std::abs(base_) + std::abs(bounds.lowest) + std::abs(bounds.highest);
+  const double margin = bounds.lowest < bounds.highest ? 1e-15 * size : 0.0;
+  lowest_ = base_ + bounds.lowest - margin;
+  highest_ = base_ + bounds.highest + margin;
+  // The spline's coefficients reach four times its heights where those alternate from texel to texel.
+  rounding_ = 4.0 * margin;
 }
 
 std::size_t HeightMap::memory_bytes() const noexcept {
-  return sizeof(*this) + values_.capacity() * sizeof(float);
+  return sizeof(*this) + values_.capacity() * sizeof(float) + ranges_.memory_bytes();
 }
 
 HeightSample HeightMap::sample(const Vec2& st) const noexcept {
@@ -229,34 +255,55 @@ HeightSample HeightMap::sample_nearest(const Vec2& st) const noexcept {
 }
 
 HeightSample HeightMap::sample_bilinear(const Vec2& st) const noexcept {
-  const TexelPair s = texels_around(unit_coordinate(st.x(), wrap_), width_);
-  const TexelPair t = texels_around(unit_coordinate(st.y(), wrap_), height_);
-  const float* below =
-      &values_[static_cast<std::size_t>(t.lower + 1) * stride_ + static_cast<std::size_t>(s.lower + 1)];
-  const float* above = below + stride_;
-  const double slope_below = static_cast<double>(below[1]) - below[0];
-  const double slope_above = static_cast<double>(above[1]) - above[0];
-  const double height_below = below[0] + s.fraction * slope_below;
-  const double height_above = above[0] + s.fraction * slope_above;
-  return {base_ + height_below + t.fraction * (height_above - height_below),
-          {(slope_below + t.fraction * (slope_above - slope_below)) * width_, (height_above - height_below) * height_}};
+  const BilinearPiece piece(stored(), wrap_, st);
+  return {base_ + piece.height_below + piece.fraction * (piece.height_above - piece.height_below),
+          {(piece.slope_below + piece.fraction * (piece.slope_above - piece.slope_below)) * width_,
+           (piece.height_above - piece.height_below) * height_}};
 }
 
 HeightSample HeightMap::sample_bspline(const Vec2& st) const noexcept {
-  const TexelPlace s = texel_under(unit_coordinate(st.x(), wrap_), width_);
-  const TexelPlace t = texel_under(unit_coordinate(st.y(), wrap_), height_);
-  const SplineWeights in_s(s.offset);
-  const SplineWeights in_t(t.offset);
-  const float* below = &values_[static_cast<std::size_t>(t.index) * stride_ + static_cast<std::size_t>(s.index)];
-  const float* middle = below + stride_;
-  const float* above = middle + stride_;
-  const double h0 = in_s.value(below[0], below[1], below[2]);
-  const double h1 = in_s.value(middle[0], middle[1], middle[2]);
-  const double h2 = in_s.value(above[0], above[1], above[2]);
-  const double g0 = in_s.slope(below[0], below[1], below[2]);
-  const double g1 = in_s.slope(middle[0], middle[1], middle[2]);
-  const double g2 = in_s.slope(above[0], above[1], above[2]);
-  return {base_ + in_t.value(h0, h1, h2), {in_t.value(g0, g1, g2) * width_, in_t.slope(h0, h1, h2) * height_}};
+  const SplinePiece piece(stored(), wrap_, st);
+  const Three heights = piece.heights();
+  return {base_ + piece.in_t.value(heights),
+          {piece.in_t.value(piece.slopes()) * width_, piece.in_t.slope(heights) * height_}};
+}
+
+HeightCurvature HeightMap::curvature(const Vec2& st) const noexcept {
+  if (reconstruction_ == Reconstruction::quadratic_bspline) [[likely]]
+    return curvature_bspline(st);
+  const HeightSample sample = this->sample(st);
+  HeightCurvature curvature{sample.height, sample.gradient, 0.0, 0.0, 0.0};
+  if (reconstruction_ == Reconstruction::bilinear) {
+    const BilinearPiece piece(stored(), wrap_, st);
+    curvature.st = (piece.slope_above - piece.slope_below) * width_ * height_;
+  }
+  return curvature;
+}
+
+HeightCurvature HeightMap::curvature_bspline(const Vec2& st) const noexcept {
+  const SplinePiece piece(stored(), wrap_, st);
+  const Three heights = piece.heights();
+  const Three slopes = piece.slopes();
+  const double width = width_;
+  const double height = height_;
+  HeightCurvature curvature{base_ + piece.in_t.value(heights),
+                            {piece.in_t.value(slopes) * width, piece.in_t.slope(heights) * height},
+                            piece.in_t.value(piece.bends()) * (width * width),
+                            piece.in_t.slope(slopes) * (width * height),
+                            piece.in_t.bend(heights) * (height * height)};
+  // The mixed derivative is 0 there by the mirrored border, as the gradient is.
+  if (lies_outside(st.x(), wrap_)) curvature.ss = 0.0;
+  if (lies_outside(st.y(), wrap_)) curvature.tt = 0.0;
+  return curvature;
+}
+
+HeightRange HeightMap::range_over(const Vec2& lower, const Vec2& upper) const noexcept {
+  if (!lower.allFinite() || !upper.allFinite()) [[unlikely]]
+    return {lowest_, highest_};
+  const TexelSpan s = texels_under(std::min(lower.x(), upper.x()), std::max(lower.x(), upper.x()), width_, wrap_);
+  const TexelSpan t = texels_under(std::min(lower.y(), upper.y()), std::max(lower.y(), upper.y()), height_, wrap_);
+  const HeightRange range = ranges_.over(stored(), s, t);
+  return {std::max(base_ + range.lowest - rounding_, lowest_), std::min(base_ + range.highest + rounding_, highest_)};
 }
 
 }  // namespace asperity

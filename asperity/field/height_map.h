@@ -5,6 +5,7 @@
 
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
+#include "asperity/field/height_range.h"
 #include "asperity/field/image.h"
 
 namespace asperity {
@@ -26,6 +27,15 @@ const char* to_string(Wrap wrap);                      ///< stable name ("repeat
 struct HeightSample {
   double height = 0.0;           ///< m, positive outside the base surface
   Vec2 gradient = Vec2::Zero();  ///< (dH/ds, dH/dt), m per unit of texture coordinate
+};
+
+/// One reading of a relief with its second derivatives.
+struct HeightCurvature {
+  double height = 0.0;           ///< m, positive outside the base surface
+  Vec2 gradient = Vec2::Zero();  ///< (dH/ds, dH/dt), m per unit of texture coordinate
+  double ss = 0.0;               ///< d2H/ds2, m per unit of texture coordinate squared
+  double st = 0.0;               ///< d2H/ds dt, likewise
+  double tt = 0.0;               ///< d2H/dt2, likewise
 };
 
 /// How grey values become metres.
@@ -63,6 +73,19 @@ class HeightMap {
   /// Height alone (m). [servo]
   [[nodiscard]] double height_at(const Vec2& st) const noexcept;
 
+  /// Height, gradient (both equal to `sample`'s to the bit) and second derivatives of the reconstruction, which jump on
+  /// the lines where its pieces meet. In a piece of the spline, a texel, `ss` is constant along s, `tt` along t and
+  /// `st` linear along both; bilinear has `st` alone, nearest none. Outside, along a clamped axis, its own are 0.
+  /// [servo]
+  [[nodiscard]] HeightCurvature curvature(const Vec2& st) const noexcept;
+  /// Bounds of the height (m) over the closed rectangle between two opposite corners, which may lie outside 0 to 1; no
+  /// sample in it leaves them, by rounding either. On up to 6 x 6 texels they exceed the true range by a term of second
+  /// order in a texel (spline) or by rounding alone. On more they lie within the range over the rectangle grown on
+  /// every side by a third of its longer side and 2.5 texels (spline: that of its coefficients on a grid twice as
+  /// fine). The time does not depend on the size. With a coordinate that is not finite: the bounds of the whole map.
+  /// [servo]
+  [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper) const noexcept;
+
   /// No sample is below this (m): the least texel, or the least coefficient of the B-spline on a grid twice as fine,
   /// which holds its overshoot (amendment 11): 4 % wide at a step, up to 40 % of the range for noise between texels.
   /// [any]
@@ -97,12 +120,16 @@ class HeightMap {
   [[nodiscard]] HeightSample sample_nearest(const Vec2& st) const noexcept;
   [[nodiscard]] HeightSample sample_bilinear(const Vec2& st) const noexcept;
   [[nodiscard]] HeightSample sample_bspline(const Vec2& st) const noexcept;
+  [[nodiscard]] HeightCurvature curvature_bspline(const Vec2& st) const noexcept;
+  [[nodiscard]] StoredTexels stored() const noexcept { return {values_.data(), width_, height_, reconstruction_}; }
 
   // Rows run with t (bottom row first) inside an apron of one texel, which holds what repeat or clamp would answer:
   // no tap ever needs an index wrapped.
   std::vector<float> values_;  // texel heights or B-spline coefficients, m, relative to base_
   std::size_t stride_ = 0;     // floats per stored row: width_ + 2
   double base_ = 0.0;          // m
+  RangePyramid ranges_;        // relative to base_
+  double rounding_ = 0.0;      // m: a sample may differ from the exact reconstruction by so much
   double lowest_ = 0.0;
   double highest_ = 0.0;
   double quantisation_step_ = 0.0;

@@ -218,6 +218,140 @@ void add_cup_sector(MeshSource& source, std::uint32_t ring, std::uint32_t sector
   }
 }
 
+/// A mesh whose triangles are cut into `parts` * `parts`: its vertices are the base's, then those inside its edges,
+/// then those inside its faces, in the order in which the faces come to them.
+class Displacement {
+ public:
+  Displacement(const TriangleMesh& base, std::uint32_t parts)
+      : base_(base), parts_(parts), edges_(3 * base.triangles().size()), points_(base.positions().size()) {}
+
+  MeshSource along(const HeightOverFace& height) {
+    for (std::uint32_t face = 0; face < base_.triangles().size(); ++face) cut(face, height);
+    MeshSource source;
+    source.triangles = std::move(triangles_);
+    source.corner_uvs = std::move(uvs_);
+    source.positions.reserve(points_.size());
+    for (const Point& point : points_)
+      source.positions.push_back(point.place + (point.heights / point.faces) * point.direction);
+    return source;
+  }
+
+ private:
+  struct Point {
+    Vec3 place = Vec3::Zero();
+    Vec3 direction = Vec3::Zero();
+    double heights = 0.0;  // sum over the faces that share it
+    double faces = 1.0;
+  };
+
+  void cut(std::uint32_t face, const HeightOverFace& height) {
+    number_edges(face);
+    row_.clear();
+    std::vector<std::uint32_t> above;
+    for (std::uint32_t j = 0; j <= parts_; ++j) {
+      above = std::move(row_);
+      row_.clear();
+      for (std::uint32_t i = 0; i + j <= parts_; ++i) row_.push_back(add(face, i, j, height));
+      for (std::uint32_t i = 0; j > 0 && i < row_.size(); ++i) {
+        emit(face, {above[i], above[i + 1], row_[i]}, {Step{i, j - 1}, Step{i + 1, j - 1}, Step{i, j}});
+        if (i + 1 < row_.size())
+          emit(face, {above[i + 1], row_[i + 1], row_[i]}, {Step{i + 1, j - 1}, Step{i + 1, j}, Step{i, j}});
+      }
+    }
+  }
+
+  /// Steps from the first corner towards the second and the third.
+  struct Step {
+    std::uint32_t i = 0;
+    std::uint32_t j = 0;
+  };
+  [[nodiscard]] Vec3 barycentric(const Step& at) const { return Vec3(parts_ - at.i - at.j, at.i, at.j) / parts_; }
+
+  /// First of the parts_ - 1 points inside each edge of `face`, made when no face before has the edge.
+  void number_edges(std::uint32_t face) {
+    const Triangle& t = base_.triangles()[face];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k];
+      const std::uint32_t b = t[(k + 1) % 3];
+      const std::uint64_t key = (std::uint64_t{std::min(a, b)} << 32U) | std::max(a, b);
+      const auto next = static_cast<std::uint32_t>(keys_.size());
+      const std::uint32_t known = edges_.find_or_insert(mixed_bits(key), next, [&](auto e) { return keys_[e] == key; });
+      if (known == no_index) {
+        keys_.push_back(key);
+        first_inside_.push_back(index_of_next());
+        points_.resize(points_.size() + parts_ - 1);
+      }
+      edge_[k] = first_inside_[known == no_index ? next : known];
+      forward_[k] = a < b;
+    }
+  }
+
+  std::uint32_t add(std::uint32_t face, std::uint32_t i, std::uint32_t j, const HeightOverFace& height) {
+    const Triangle& t = base_.triangles()[face];
+    const std::uint32_t rest = parts_ - i - j;
+    const auto inside = [&](std::size_t k, std::uint32_t step) {
+      return edge_[k] + (forward_[k] ? step : parts_ - step) - 1;
+    };
+    std::uint32_t id = 0;
+    if (rest == parts_ || i == parts_ || j == parts_) {
+      id = t[rest == parts_ ? 0 : (i == parts_ ? 1 : 2)];
+    } else if (j == 0) {
+      id = inside(0, i);
+    } else if (rest == 0) {
+      id = inside(1, j);
+    } else if (i == 0) {
+      id = inside(2, rest);
+    } else {
+      id = index_of_next();
+      points_.emplace_back();
+    }
+    const Vec3 b = barycentric({i, j});
+    Point& point = points_[id];
+    if (point.direction.isZero(0.0)) {
+      const auto corners = base_.corners(face);
+      point.place = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
+      point.direction = direction(face, b);
+    } else {
+      point.faces += 1.0;
+    }
+    point.heights += height(face, b);
+    return id;
+  }
+
+  [[nodiscard]] Vec3 direction(std::uint32_t face, const Vec3& b) const {
+    const Triangle& t = base_.triangles()[face];
+    const Vec3 mixed =
+        b[0] * base_.vertex_normal(t[0]) + b[1] * base_.vertex_normal(t[1]) + b[2] * base_.vertex_normal(t[2]);
+    const double length = mixed.norm();
+    return length > 1e-6 ? Vec3(mixed / length) : base_.face_normal(face);
+  }
+
+  void emit(std::uint32_t face, const Triangle& triangle, const std::array<Step, 3>& steps) {
+    triangles_.push_back(triangle);
+    if (!base_.has_uvs()) return;
+    std::array<Vec2f, 3>& uvs = uvs_.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f b = barycentric(steps[k]).cast<float>();
+      const auto& corners = base_.uvs(face);
+      uvs[k] = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
+    }
+  }
+
+  [[nodiscard]] std::uint32_t index_of_next() const { return static_cast<std::uint32_t>(points_.size()); }
+
+  const TriangleMesh& base_;
+  std::uint32_t parts_;
+  IndexTable edges_;
+  std::vector<std::uint64_t> keys_;  // of the edges numbered so far, and the first point inside each
+  std::vector<std::uint32_t> first_inside_;
+  std::array<std::uint32_t, 3> edge_{};  // of the face at hand
+  std::array<bool, 3> forward_{};
+  std::vector<std::uint32_t> row_;
+  std::vector<Point> points_;
+  std::vector<Triangle> triangles_;
+  std::vector<std::array<Vec2f, 3>> uvs_;
+};
+
 /// Smooth random function on the unit sphere, |value| <= 1: a few waves of random direction and phase.
 class RandomWaves {
  public:
@@ -303,14 +437,17 @@ MeshSource trial_mesh_b(double largest_fold, const TrialMeshSettings& settings) 
   return source;
 }
 
-MeshSource trial_mesh_c(const TrialMeshSettings& settings) {
+MeshSource trial_mesh_c(const TrialMeshSettings& settings, std::span<const double> ridge_angles) {
   const TrialMeshSettings used = checked(settings);
   MeshSource source = unit_lattice(used);
-  constexpr std::array<double, 6> slopes_degrees = {60.0, -60.0, 45.0, -45.0, 30.0, -30.0};
+  constexpr double pi = std::numbers::pi;
+  constexpr std::array<double, 3> papers = {pi / 3.0, pi / 2.0, 2.0 * pi / 3.0};
+  if (ridge_angles.empty()) ridge_angles = papers;
   const double height = std::sqrt(3.0) / 2.0;
   std::vector<Vec2> profile = {Vec2::Zero()};  // y and z of each row
   for (std::size_t j = 0; j < static_cast<std::size_t>(used.rows); ++j) {
-    const double slope = slopes_degrees[j % 6] * std::numbers::pi / 180.0;
+    const double ridge = within(ridge_angles[j / 2 % ridge_angles.size()], pi / 18.0, pi);
+    const double slope = (j % 2 == 0 ? 0.5 : -0.5) * (pi - ridge);
     profile.push_back(profile.back() + height * Vec2(std::cos(slope), std::sin(slope)));
   }
   const double middle = 0.5 * profile.back().x();
@@ -346,14 +483,22 @@ MeshSource trial_mesh_e(int rings, double opening, double mean_edge) {
   return source;
 }
 
-MeshSource trial_mesh_f(int triangles, double mean_edge) {
-  const int count = std::clamp(triangles, 1, 40);
+int most_graded_triangles(double grading) {
+  const double halvings = -std::log2(within(grading, 0.1, 0.9));
+  return static_cast<int>(std::min(40.0, 40.0 / halvings));
+}
+
+MeshSource trial_mesh_f(int triangles, double mean_edge, double grading) {
+  const int count = std::clamp(triangles, 1, most_graded_triangles(grading));
+  const double ratio = within(grading, 0.1, 0.9);
   MeshSource source;
   Box bounds;
-  // Vertices alternate between two rays that meet at 45 degrees on the right, each 1/sqrt(2) nearer to their meeting.
+  // Vertices alternate between two rays that meet on the right, each the foot of the perpendicular from the one before:
+  // by the cosine of the rays' angle nearer to their meeting.
+  const double half_angle = 0.5 * std::atan2(std::sqrt(1.0 - ratio), std::sqrt(ratio));
   for (int k = 0; k < count + 2; ++k) {
-    const double from_tip = std::pow(2.0, -0.5 * k);
-    const double tilt = (k % 2 == 0 ? -1.0 : 1.0) * std::numbers::pi / 8.0;
+    const double from_tip = std::pow(ratio, 0.5 * k);
+    const double tilt = k % 2 == 0 ? -half_angle : half_angle;
     source.positions.emplace_back(-from_tip * std::cos(tilt), from_tip * std::sin(tilt), 0.0);
     bounds.include(source.positions.back());
   }
@@ -366,6 +511,17 @@ MeshSource trial_mesh_f(int triangles, double mean_edge) {
   }
   scale_to_mean_edge(source, mean_edge);
   return source;
+}
+
+MeshSource displaced_mesh(const TriangleMesh& base, int subdivisions, const HeightOverFace& height) {
+  int times = std::clamp(subdivisions, 0, 10);
+  while (times > 0 && (base.triangles().size() << static_cast<unsigned>(2 * times)) > most_displaced_triangles) --times;
+  return Displacement(base, 1U << static_cast<unsigned>(times)).along(height);
+}
+
+MeshSource trial_mesh_g(int subdivisions, const HeightOverFace& height, double largest_fold,
+                        const TrialMeshSettings& settings) {
+  return displaced_mesh(TriangleMesh::build(trial_mesh_b(largest_fold, settings)).value(), subdivisions, height);
 }
 
 MeshSource box_mesh(const Vec3& size) {

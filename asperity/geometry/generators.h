@@ -6,7 +6,9 @@
 // generator always answers a mesh. Open meshes turn their touched side (the normals) towards +z.
 
 #include <cstdint>
+#include <functional>
 #include <numbers>
+#include <span>
 
 #include "asperity/geometry/mesh.h"
 
@@ -48,10 +50,11 @@ MeshSource trial_mesh_a(const TrialMeshSettings& settings = {});
 /// `largest_fold` 1e-3 to pi/4. UVs those of M_a. [build]
 MeshSource trial_mesh_b(double largest_fold = std::numbers::pi / 30.0, const TrialMeshSettings& settings = {});
 
-/// M_c (hrm-2010, Table 1): M_a folded along its rows into a corrugated sheet that never overhangs. The angles between
-/// the two faces at the ridges are 60, 90, 120 degrees in turn (acute, square, obtuse), those in the valleys 75, 105,
-/// 90; edges within a strip stay flat. Faces stay equilateral. UVs those of M_a. [build]
-MeshSource trial_mesh_c(const TrialMeshSettings& settings = {});
+/// M_c (hrm-2010, Table 1): M_a folded along its rows into a corrugated sheet that never overhangs. `ridge_angles` are
+/// the angles between the two faces at the ridges, in turn, pi/18 to pi each; none: 60, 90, 120 degrees (acute, square,
+/// obtuse). Both sides of a ridge slope alike, so that the angle in a valley is the mean of its two ridges' (75, 105,
+/// 90); edges within a strip stay flat. Faces stay equilateral. UVs those of M_a. [build]
+MeshSource trial_mesh_c(const TrialMeshSettings& settings = {}, std::span<const double> ridge_angles = {});
 
 /// M_e (hrm-2010, Table 1): an open cup without wall thickness, part of a sphere around the origin below a plane rim,
 /// opening towards +z. Normals point to the sphere's centre: the inside of the cup is the touched side, and every inner
@@ -60,11 +63,33 @@ MeshSource trial_mesh_c(const TrialMeshSettings& settings = {});
 /// 512; `mean_edge` 1e-9 to 1e9 m. UVs: the rings laid flat in a disc of diameter 1. [build]
 MeshSource trial_mesh_e(int rings = 8, double opening = std::numbers::pi / 2.0, double mean_edge = 0.01);
 
-/// M_f (hrm-2010, Table 1): an open, flat strip of `triangles` isosceles right triangles in z = 0, from big on the left
-/// to small on the right; each has half the area and 1/sqrt(2) the height of the one before. UVs per face: right angle
-/// at (0, 0), the others at (1, 0) and (0, 1), so that a map's features shrink with the face.
-/// `triangles` 1 to 40; `mean_edge` (of the whole mesh) 1e-9 to 1e9 m. [build]
-MeshSource trial_mesh_f(int triangles = 10, double mean_edge = 0.01);
+/// M_f (hrm-2010, Table 1): an open, flat strip of `triangles` similar right triangles in z = 0, from big on the left
+/// to small on the right; each has `grading` times the area and sqrt(grading) times the height of the one before. At
+/// the paper's grading, one half, they are isosceles. UVs per face: right angle at (0, 0), the others at (1, 0) and
+/// (0, 1), so that a map's features shrink with the face. `grading` 0.1 to 0.9; `triangles` 1 to
+/// most_graded_triangles(grading); `mean_edge` (of the whole mesh) 1e-9 to 1e9 m. [build]
+MeshSource trial_mesh_f(int triangles = 10, double mean_edge = 0.01, double grading = 0.5);
+
+/// How many triangles a strip of this grading may have: at most 40, the last with at least 2^-40 of the first's area.
+/// [any]
+int most_graded_triangles(double grading);
+
+/// Height (m, outward) over the point of a mesh's triangle `face` with these barycentric coordinates.
+using HeightOverFace = std::function<double(std::uint32_t face, const Vec3& barycentric)>;
+
+/// Geometry in place of a coat: every triangle of `base` cut into 4^subdivisions similar ones, every vertex moved by
+/// `height` along the interpolated vertex normal (of length 1). Where faces share a point it is one vertex, at the mean
+/// of their heights, so that the answer is as closed as the base. UVs are the base's, interpolated; none where it has
+/// none. `subdivisions` 0 to 10, and so that there are at most most_displaced_triangles. [build]
+MeshSource displaced_mesh(const TriangleMesh& base, int subdivisions, const HeightOverFace& height);
+
+/// Bound on the triangles of displaced_mesh.
+inline constexpr std::size_t most_displaced_triangles = 4'194'304;
+
+/// M_G (hrm-2010, Table 1): M_b with small triangles that follow a height field in place of its coat; `height` is over
+/// the faces of trial_mesh_b(largest_fold, settings). [build]
+MeshSource trial_mesh_g(int subdivisions, const HeightOverFace& height, double largest_fold = std::numbers::pi / 30.0,
+                        const TrialMeshSettings& settings = {});
 
 /// A closed box around the origin, outward, 12 triangles; `size` along x, y, z, each 1e-9 to 1e9 m and at least
 /// 1e-7 of the longest.

@@ -106,6 +106,16 @@ class TriangleMesh {
   std::vector<std::string> notes_;
 };
 
+/// Whether two triangles have a corner in common. [servo]
+inline bool share_vertex(const TriangleMesh::Triangle& a, const TriangleMesh::Triangle& b) noexcept {
+  for (const std::uint32_t i : a) {
+    for (const std::uint32_t j : b) {
+      if (i == j) return true;
+    }
+  }
+  return false;
+}
+
 /// Calls `visit(face)` once for every triangle that shares at least one vertex with `face`, itself included:
 /// the papers' "adjoining" faces (hrm-2010, 4.1). Does not allocate. [servo]
 template <class Visit>

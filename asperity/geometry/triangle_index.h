@@ -45,6 +45,21 @@ class TriangleIndex {
   void for_each_in_box(const Box& box, Visit&& visit) const {
     std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, *structure_);
   }
+  /// Calls visit(face), roughly from near to far, for every triangle whose bounding box grown by `radius` (m) the
+  /// segment meets; visit answers the fraction of the segment beyond which nothing is wanted any more. [servo]
+  template <class Visit>
+  void for_each_along(const Segment& segment, double radius, Visit&& visit) const {
+    if (const auto* bvh = std::get_if<Bvh>(structure_.get())) {
+      bvh->for_each_along(segment, radius, visit);
+      return;
+    }
+    Box box;
+    box.include(segment.from);
+    box.include(segment.to);
+    std::get_if<TriangleOctree>(structure_.get())->for_each_in_box(box.grown(radius), [&](std::uint32_t face) {
+      visit(face);
+    });
+  }
 
   /// First touch of a ball of `radius` (m, plus skin) moving along `motion`. Triangles seen from behind at the start
   /// are passed through when `sides` is front. A ball's motion

@@ -35,6 +35,107 @@ struct HeightScale {
   double offset = 0.0;
 };
 
+/// Reads a formula's parameters; every one that the formula does not take is refused by name. What they must be to one
+/// another (a flank within its rim) the formula itself checks.
+class HeightGeneratorReader {
+ public:
+  explicit HeightGeneratorReader(ObjectReader& reader) : reader_(reader) {}
+
+  MesostructureSpec read() {
+    spec_.kind = read_kind();
+    spec_.size = reader_.integer("size", 512, 2, 8192);
+    refuse_others();
+    spec_ = completed(spec_);
+    if (takes("count")) spec_.count = reader_.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
+    if (takes("number")) read_number();
+    if (takes("seed")) read_seed();
+    if (takes("wall")) spec_.wall = share("wall", spec_.wall, 0.5);
+    if (takes("width")) spec_.width = share("width", *spec_.width, 1.0);
+    if (takes("flank")) spec_.flank = share("flank", own_flank(), 0.25);
+    if (takes("radius")) read_radius();
+    if (takes("rim")) spec_.rim = share("rim", spec_.rim, 0.5);
+    if (takes("field")) spec_.field = share("field", spec_.field, 1.0);
+    if (takes("overlap")) spec_.overlap = share("overlap", spec_.overlap, 0.9);
+    if (takes("hurst")) spec_.hurst = reader_.number("hurst", spec_.hurst, Range{0.05, 1.0});
+    if (takes("octaves")) spec_.octaves = reader_.integer("octaves", *spec_.octaves, 1, 12);
+    return spec_;
+  }
+
+ private:
+  MesostructureKind read_kind() {
+    const std::string name = reader_.text("generator", "");
+    if (reader_.failed()) return MesostructureKind::flat;
+    Result<MesostructureKind> parsed = parse_mesostructure_kind(name);
+    if (parsed) return *parsed;
+    reader_.fail(std::move(parsed).error().at(reader_.place_of("generator")));
+    return MesostructureKind::flat;
+  }
+
+  [[nodiscard]] bool takes(std::string_view parameter) const {
+    const auto taken = parameters_of(spec_.kind);
+    return std::find(taken.begin(), taken.end(), parameter) != taken.end();
+  }
+
+  void refuse_others() {
+    for (const SceneObjectKeys& entry : scene_object_keys()) {
+      if (entry.object != "height generator") continue;
+      for (const std::string& key : entry.keys) {
+        if (key != "generator" && key != "size" && !takes(key)) reader_.refuse({key}, "by this generator");
+      }
+    }
+  }
+
+  double share(std::string_view key, double fallback, double most) {
+    return reader_.quantity(key, Dimension::ratio, fallback, Range{0.0, most});
+  }
+
+  /// The groove's follows from its width, which may be stated.
+  [[nodiscard]] double own_flank() const {
+    MesostructureSpec open = spec_;
+    open.flank.reset();
+    return *completed(open).flank;
+  }
+
+  void read_number() {
+    if (spec_.number || reader_.has("number"))
+      spec_.number = reader_.integer("number", spec_.number.value_or(1), 1, 2000);
+  }
+
+  void read_seed() {
+    if (spec_.kind == MesostructureKind::rings && !spec_.number) {
+      reader_.refuse({"seed"}, "by the fixed arrangement (\"number\" scatters features)");
+    } else {
+      spec_.seed = reader_.seed("seed", spec_.seed);
+    }
+  }
+
+  void read_radius() {
+    const SceneJson* given = reader_.raw("radius");
+    const bool one = spec_.kind == MesostructureKind::groove;
+    if (given != nullptr && given->is_array() && !one) {
+      read_radius_range(*given);
+    } else if (given != nullptr || one) {
+      const double radius = reader_.quantity("radius", Dimension::ratio, spec_.radius->high, Range{0.001, 0.25});
+      spec_.radius = ShareRange{radius, radius};
+    } else {
+      reader_.write("radius", SceneJson::array({spec_.radius->low, spec_.radius->high}));
+    }
+  }
+
+  void read_radius_range(const SceneJson& given) {
+    const char* accepted = "a share of the tile from 0.001 to 0.25, or two [smallest, largest]";
+    if (given.size() != 2 || !given[0].is_number() || !given[1].is_number()) {
+      reader_.fail("radius", "is no pair of numbers", accepted);
+      return;
+    }
+    spec_.radius = ShareRange{given[0].get<double>(), given[1].get<double>()};
+    reader_.write("radius", given);
+  }
+
+  ObjectReader& reader_;
+  MesostructureSpec spec_;
+};
+
 class CoatReader {
  public:
   CoatReader(const SceneJson& json, const std::string& place, const TriangleMesh& mesh, SceneContext& context)
@@ -52,7 +153,10 @@ class CoatReader {
     ASPERITY_CHECK(check_amplitude(heights));
     ASPERITY_TRY(const Vec2 tile, read_tile(heights));
     ASPERITY_TRY(Mesostructure maps, with_normals(std::move(heights), tile));
-    CoatSettings settings{mapping_, repeat_};
+    CoatSettings settings{mapping_, repeat_, {}};
+    if (const SceneJson* stitching = reader_.raw("stitching")) {
+      ASPERITY_TRY(settings.stitching, read_stitching(*stitching, reader_.place_of("stitching"), context_, reader_));
+    }
     Result<Coat> coat = Coat::build(mesh_, std::make_shared<const Mesostructure>(std::move(maps)), settings);
     if (!coat) return std::move(coat).error().at(reader_.place());
     return ScenePart<Coat>{std::move(*coat), std::move(reader_.canonical())};
@@ -77,26 +181,7 @@ class CoatReader {
 
   void read_generator(const SceneJson& json) {
     ObjectReader generator(json, reader_.place_of("height_map"), "height generator");
-    const std::string kind = generator.text("generator", "");
-    if (!generator.failed()) {
-      Result<MesostructureKind> parsed = parse_mesostructure_kind(kind);
-      if (parsed) {
-        spec_.kind = *parsed;
-      } else {
-        generator.fail(std::move(parsed).error().at(generator.place_of("generator")));
-      }
-    }
-    spec_.size = generator.integer("size", 512, 2, 8192);
-    if (spec_.kind == MesostructureKind::serrated || spec_.kind == MesostructureKind::beams) {
-      spec_.count = generator.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
-    } else {
-      generator.refuse({"count"}, "by this generator");
-    }
-    if (spec_.kind == MesostructureKind::warts) {
-      spec_.seed = generator.seed("seed", spec_.seed);
-    } else {
-      generator.refuse({"seed"}, "by this generator");
-    }
+    spec_ = HeightGeneratorReader(generator).read();
     reader_.take("height_map", std::move(generator));
   }
 
@@ -168,21 +253,49 @@ class CoatReader {
     reconstruction_ = static_cast<Reconstruction>(reader_.choice("filter", filters, 2));
   }
 
-  /// A length, or a share of the mean edge, the papers' shorthand.
-  double read_height(double fallback) {
-    const SceneJson* value = reader_.raw("height");
-    const bool flat = generated_ && spec_.kind == MesostructureKind::flat;
-    const Range range = flat ? Range{} : Range::not_negative();
-    const std::string text = value != nullptr && value->is_string() ? value->get<std::string>() : std::string();
-    if (text.find('%') == std::string::npos) return reader_.quantity("height", Dimension::length, fallback, range);
-    Result<double> share = parse_quantity(text, Dimension::ratio);
-    if (!share || !range.holds(*share)) {
-      reader_.fail("height", fmt::format("\"{}\" is no share of the mean edge", text),
-                   "\"10%\", or a length of 0 or more (m, cm, mm, um, in)");
-      return fallback;
+  /// What a height may be, for messages.
+  [[nodiscard]] static std::string accepted_height(const Range& range) {
+    const bool signed_height = range.low < 0.0;
+    return fmt::format("a length{} ({}), or a share of the mean edge (\"10 %\")", signed_height ? "" : " of 0 or more",
+                       accepted_units(Dimension::length));
+  }
+
+  /// A length, or a share of the mean edge (the papers' shorthand), in metres.
+  Result<double> height_of(const SceneJson& value, const std::string& place, const Range& range) const {
+    const auto wrong = [&](ErrorCode code, std::string what) {
+      return Error{code, std::move(what), {}, place, accepted_height(range)};
+    };
+    double height = 0.0;
+    if (value.is_string()) {
+      const auto& text = value.get_ref<const std::string&>();
+      const bool share = text.find('%') != std::string::npos;
+      Result<double> parsed = parse_quantity(text, share ? Dimension::ratio : Dimension::length);
+      if (!parsed && share)
+        return wrong(ErrorCode::bad_value, fmt::format("\"{}\" is no share of the mean edge", text));
+      if (!parsed) return wrong(ErrorCode::bad_value, parsed.error().what);
+      height = share ? *parsed * mesh_.mean_edge() : *parsed;
+    } else if (value.is_number()) {
+      height = value.get<double>();
+    } else {
+      return wrong(ErrorCode::bad_type, fmt::format("is {}", json_type(value)));
     }
-    const double height = *share * mesh_.mean_edge();
-    reader_.write("height", height);
+    if (std::isfinite(height) && range.holds(height)) return height;
+    return wrong(ErrorCode::bad_value, value.is_string() ? fmt::format("is {}", value.get_ref<const std::string&>())
+                                                         : fmt::format("is {:.6g}", height));
+  }
+
+  double read_height(const char* key, double fallback, const Range& range) {
+    const SceneJson* value = reader_.raw(key);
+    double height = fallback;
+    if (value != nullptr) {
+      Result<double> read = height_of(*value, reader_.place_of(key), range);
+      if (!read) {
+        reader_.fail(std::move(read).error());
+        return fallback;
+      }
+      height = *read;
+    }
+    reader_.write(key, height);
     return height;
   }
 
@@ -205,8 +318,8 @@ class CoatReader {
     }
     // `magnify` scales what the scene says; the default is a share of the mesh as it is.
     const double fallback = flat ? 0.0 : papers_best * mesh_.mean_edge() / magnify_;
-    scale_.amplitude = read_height(fallback);
-    scale_.offset = reader_.quantity("offset", Dimension::length, 0.0);
+    scale_.amplitude = read_height("height", fallback, flat ? Range{} : Range::not_negative());
+    scale_.offset = read_height("offset", 0.0, Range{});
     if (!reader_.has("height") && !flat) {
       context_.note(
           fmt::format("coat: no height is stated; 10 % of the mean edge is taken, {} (\"height\" chooses otherwise)",
@@ -221,14 +334,12 @@ class CoatReader {
     }
     double ends[2] = {0.0, 0.0};
     for (std::size_t i = 0; i < 2; ++i) {
-      const SceneJson wrapped = SceneJson{{"height", range[i]}};
-      ObjectReader end(wrapped, fmt::format("{}[{}]", reader_.place_of("height_range"), i), "coat");
-      ends[i] = end.quantity("height", Dimension::length, 0.0);
-      if (end.error()) {
-        Error error = *end.error();
-        error.place = end.place();
-        reader_.fail(std::move(error));
+      Result<double> end = height_of(range[i], fmt::format("{}[{}]", reader_.place_of("height_range"), i), Range{});
+      if (!end) {
+        reader_.fail(std::move(end).error());
+        return;
       }
+      ends[i] = *end;
     }
     if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", "two lengths [lowest, highest]");
     scale_ = {ends[1] - ends[0], white_is_deep_ ? ends[1] : ends[0]};
@@ -378,14 +489,22 @@ class CoatReader {
     return {side / repeat_.x(), side / repeat_.y()};
   }
 
+  /// Normals of the reconstruction where it is touched, or the papers' normal map of the heights (hrm-2010, section 4).
+  Result<Mesostructure> with_own_normals(HeightMap heights, const Vec2& tile) {
+    static const std::vector<std::string> sources{"heights", "map"};
+    reader_.refuse({"green"}, "without normal_map");
+    const bool map = reader_.choice("normals", sources, 0) == 1;
+    ASPERITY_CHECK(reader_.status());
+    if (!map) return Mesostructure::build(std::move(heights), tile);
+    Result<NormalMap> normals = NormalMap::build(heights, tile);
+    if (!normals) return std::move(normals).error().at(reader_.place_of("normals"));
+    return Mesostructure::build(std::move(heights), std::move(*normals), tile);
+  }
+
   Result<Mesostructure> with_normals(HeightMap heights, const Vec2& tile) {
+    if (reader_.raw("normal_map") == nullptr) return with_own_normals(std::move(heights), tile);
     static const std::vector<std::string> greens{"up", "down"};
-    const SceneJson* file = reader_.raw("normal_map");
-    if (file == nullptr) {
-      reader_.refuse({"green"}, "without normal_map");
-      ASPERITY_CHECK(reader_.status());
-      return Mesostructure::build(std::move(heights), tile);
-    }
+    reader_.refuse({"normals"}, "beside normal_map");
     const std::string name = reader_.text("normal_map", "");
     const auto green = static_cast<GreenConvention>(reader_.choice("green", greens, 0));
     ASPERITY_CHECK(reader_.status());

@@ -11,7 +11,7 @@ namespace asperity {
 namespace {
 
 const std::vector<std::string>& blend_names() {
-  static const std::vector<std::string> names{"none", "linear", "s_shape"};
+  static const std::vector<std::string> names{"none", "linear", "s_shape", "quintic"};
   return names;
 }
 const std::vector<std::string>& formulation_names() {
@@ -50,13 +50,12 @@ Result<std::vector<double>> read_blend_map(const SceneJson& json, const std::str
   return means;
 }
 
-Status read_mesostructure(ObjectReader& reader, const SceneContext& context, MesostructureLaw& law) {
-  reader.refuse({"edge_taper"}, "by a mesostructure law");
-  law.rho = reader.number("rho", law.rho, Range{0.0, 1.0 / 3.0, true});
+/// A blend by its name, an image or an array of weights, as both laws and coats have it.
+Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind, std::vector<double>& weights) {
   const SceneJson* blend = reader.raw("blend");
   if (blend != nullptr && blend->is_object()) {
-    ASPERITY_TRY(law.blend_map, read_blend_map(*blend, reader.place_of("blend"), context, reader));
-    law.blend = Blend::image;
+    ASPERITY_TRY(weights, read_blend_map(*blend, reader.place_of("blend"), context, reader));
+    kind = Blend::image;
   } else if (blend != nullptr && blend->is_array()) {
     for (std::size_t i = 0; i < blend->size(); ++i) {
       if (!(*blend)[i].is_number()) {
@@ -66,16 +65,43 @@ Status read_mesostructure(ObjectReader& reader, const SceneContext& context, Mes
                      fmt::format("{}[{}]", reader.place_of("blend"), i),
                      "weights from 0 to 1"};
       }
-      law.blend_map.push_back((*blend)[i].get<double>());
+      weights.push_back((*blend)[i].get<double>());
     }
-    law.blend = Blend::image;
+    kind = Blend::image;
     reader.write("blend", *blend);
   } else if (blend != nullptr && !blend->is_string()) {
-    reader.fail_type("blend", *blend, "\"none\", \"linear\", \"s_shape\", {\"image\": file}, or an array of weights");
+    reader.fail_type("blend", *blend,
+                     "\"none\", \"linear\", \"s_shape\", \"quintic\", {\"image\": file}, or an array of weights");
   } else {
-    law.blend = static_cast<Blend>(reader.choice("blend", blend_names(), static_cast<std::size_t>(law.blend)));
+    kind = static_cast<Blend>(reader.choice("blend", blend_names(), static_cast<std::size_t>(kind)));
   }
   return reader.status();
+}
+
+Status read_mesostructure(ObjectReader& reader, const SceneContext& context, MesostructureLaw& law) {
+  reader.refuse({"edge_taper", "subdivisions", "influence_radius"}, "by a mesostructure law");
+  if (law.formulation == Formulation::consistent) {
+    reader.refuse({"rho", "blend"}, "by the consistent mesostructure law: the coat's \"stitching\" says how it blends");
+    return reader.status();
+  }
+  law.rho = reader.number("rho", law.rho, Range{0.0, 1.0 / 3.0, true});
+  return read_blend(reader, context, law.blend, law.blend_map);
+}
+
+void read_generated(ObjectReader& reader, GeneratedGeometryLaw& law) {
+  reader.refuse({"formulation", "rho", "blend", "edge_taper"}, "by the law \"generated-geometry\"");
+  law.subdivisions = reader.integer("subdivisions", law.subdivisions, 1, most_generated_subdivisions);
+  law.influence_radius =
+      reader.optional_quantity("influence_radius", Dimension::length, Range::positive()).value_or(0.0);
+}
+
+void read_dense(ObjectReader& reader, DenseMeshLaw& law) {
+  reader.refuse({"formulation", "rho", "blend", "edge_taper", "influence_radius"}, "by the law \"dense-mesh\"");
+  if (reader.has("subdivisions")) law.subdivisions = reader.integer("subdivisions", 1, 1, most_generated_subdivisions);
+}
+
+SceneJson blend_json(Blend blend, const std::vector<double>& weights) {
+  return blend == Blend::image ? SceneJson(weights) : SceneJson(blend_names()[static_cast<std::size_t>(blend)]);
 }
 
 }  // namespace
@@ -89,14 +115,21 @@ SceneJson law_json(const Law& law) {
   } else if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
     json["type"] = "mesostructure";
     json["formulation"] = formulation_names()[static_cast<std::size_t>(meso->formulation)];
-    json["rho"] = meso->rho;
-    if (meso->blend == Blend::image) {
-      json["blend"] = meso->blend_map;
-    } else {
-      json["blend"] = blend_names()[static_cast<std::size_t>(meso->blend)];
+    if (meso->formulation == Formulation::literal) {
+      json["rho"] = meso->rho;
+      json["blend"] = blend_json(meso->blend, meso->blend_map);
     }
+  } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
+    json["type"] = "force-shading";
+    json["formulation"] = formulation_names()[static_cast<std::size_t>(shading->formulation)];
   } else {
     json["type"] = law_name(law);
+    if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
+      json["subdivisions"] = generated->subdivisions;
+      if (generated->influence_radius > 0.0) json["influence_radius"] = generated->influence_radius;
+    }
+    if (const auto* dense = std::get_if<DenseMeshLaw>(&law); dense != nullptr && dense->subdivisions > 0)
+      json["subdivisions"] = dense->subdivisions;
   }
   return json;
 }
@@ -111,7 +144,7 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     return Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place, "a law's name or an object"};
   }
   ObjectReader reader(json, place, "law");
-  const std::string type = reader.text("type", "mesostructure");
+  const std::string type = reader.text("type", "proxy");
   ASPERITY_CHECK(reader.status());
   Result<Law> law = law_by_name(type);
   if (!law) return std::move(law).error().at(place + ".type");
@@ -122,16 +155,37 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
     meso->formulation = formulation(meso->formulation);
     ASPERITY_CHECK(read_mesostructure(reader, context, *meso));
+  } else if (auto* shading = std::get_if<ForceShadingLaw>(&*law)) {
+    reader.refuse({"rho", "blend", "edge_taper", "subdivisions", "influence_radius"}, "by force shading");
+    shading->formulation = formulation(shading->formulation);
   } else if (auto* height_field = std::get_if<HeightFieldLaw>(&*law)) {
-    reader.refuse({"rho", "blend"}, "by a height-field law");
+    reader.refuse({"rho", "blend", "subdivisions", "influence_radius"}, "by a height-field law");
     height_field->formulation = formulation(height_field->formulation);
     height_field->edge_taper = reader.number("edge_taper", height_field->edge_taper, Range{0.0, 1.0 / 3.0});
+  } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&*law)) {
+    read_generated(reader, *generated);
+  } else if (auto* dense = std::get_if<DenseMeshLaw>(&*law)) {
+    read_dense(reader, *dense);
   } else {
-    reader.refuse({"formulation", "rho", "blend", "edge_taper"}, fmt::format("by the law \"{}\"", type));
+    reader.refuse({"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius"},
+                  fmt::format("by the law \"{}\"", type));
   }
   ASPERITY_CHECK(reader.status());
   if (auto valid = validate(*law); !valid) return std::move(valid).error().at(place);
   return ScenePart<Law>{*law, law_json(*law)};
+}
+
+Result<Stitching> read_stitching(const SceneJson& json, const std::string& place, const SceneContext& context,
+                                 ObjectReader& coat) {
+  static const std::vector<std::string> folds{"keep", "round"};
+  ObjectReader reader(json, place, "stitching");
+  Stitching stitching;
+  stitching.folds = static_cast<FoldMode>(reader.choice("folds", folds, 0));
+  stitching.rho = reader.number("rho", stitching.rho, Range{0.0, 1.0 / 3.0, true});
+  ASPERITY_CHECK(read_blend(reader, context, stitching.blend, stitching.blend_map));
+  if (auto valid = validate(stitching); !valid) return std::move(valid).error().at(place);
+  coat.take("stitching", std::move(reader));
+  return stitching;
 }
 
 }  // namespace asperity

@@ -14,7 +14,8 @@ namespace asperity {
 namespace {
 
 const std::vector<std::string>& generator_names() {
-  static const std::vector<std::string> names{"icosphere", "M_a", "M_b", "M_c", "M_e", "M_f", "plane", "box", "random"};
+  static const std::vector<std::string> names{"icosphere", "M_a", "M_b",   "M_c", "M_d",   "M_e",
+                                              "M_f",       "M_G", "plane", "box", "random"};
   return names;
 }
 
@@ -44,20 +45,19 @@ Vec3 turned_up(const Vec3& p, std::size_t axis) {
 /// Reads one generator's parameters; every one that it does not take is refused by name.
 class GeneratorReader {
  public:
-  explicit GeneratorReader(ObjectReader& reader) : reader_(reader) {}
+  GeneratorReader(ObjectReader& reader, SceneContext& context) : reader_(reader), context_(context) {}
 
-  MeshSource generate(std::size_t generator) {
-    switch (generator) {
-      case 0: return icosphere_source();
-      case 1: return flat(&trial_mesh_a);
-      case 2: return trial_b();
-      case 3: return flat(&trial_mesh_c);
-      case 4: return cup();
-      case 5: return strip();
-      case 6: return plane();
-      case 7: return box();
-      default: return blob();
-    }
+  MeshSource generate(std::string_view generator) {
+    if (generator == "icosphere" || generator == "M_d") return icosphere_source();
+    if (generator == "M_a") return trial_a();
+    if (generator == "M_b") return trial_b();
+    if (generator == "M_c") return trial_c();
+    if (generator == "M_e") return cup();
+    if (generator == "M_f") return strip();
+    if (generator == "M_G") return displaced();
+    if (generator == "plane") return plane();
+    if (generator == "box") return box();
+    return blob();
   }
 
  private:
@@ -92,18 +92,101 @@ class GeneratorReader {
     settings.mean_edge = length("mean_edge", settings.mean_edge);
     return settings;
   }
-  MeshSource flat(MeshSource (*generator)(const TrialMeshSettings&)) {
+  double largest_fold() {
+    return reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0,
+                            Range{1e-3, std::numbers::pi / 4.0});
+  }
+  MeshSource trial_a() {
     only({"columns", "rows", "mean_edge"});
     const TrialMeshSettings settings = trial_settings();
-    return make([&] { return generator(settings); });
+    return make([&] { return trial_mesh_a(settings); });
   }
   MeshSource trial_b() {
     only({"columns", "rows", "mean_edge", "largest_fold"});
     const TrialMeshSettings settings = trial_settings();
-    const double fold = reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0,
-                                         Range{1e-3, std::numbers::pi / 4.0});
+    const double fold = largest_fold();
     return make([&] { return trial_mesh_b(fold, settings); });
   }
+  MeshSource trial_c() {
+    only({"columns", "rows", "mean_edge", "fold_angles"});
+    const TrialMeshSettings settings = trial_settings();
+    const std::vector<double> angles = fold_angles();
+    return make([&] { return trial_mesh_c(settings, angles); });
+  }
+
+  /// Angles between the faces at M_c's ridges.
+  std::vector<double> fold_angles() {
+    constexpr double degree = std::numbers::pi / 180.0;
+    constexpr std::size_t most = 1000;
+    const char* accepted = "1 to 1000 angles, 10 to 180 degrees each (rad, or \"60 deg\")";
+    const SceneJson* given = reader_.raw("fold_angles");
+    std::vector<double> angles{60.0 * degree, 90.0 * degree, 120.0 * degree};
+    if (given != nullptr && !given->is_array()) {
+      reader_.fail_type("fold_angles", *given, accepted);
+    } else if (given != nullptr && (given->empty() || given->size() > most)) {
+      reader_.fail("fold_angles", fmt::format("has {} angles", given->size()), accepted);
+    } else if (given != nullptr) {
+      angles.clear();
+      for (std::size_t i = 0; i < given->size(); ++i) {
+        const SceneJson wrapped = SceneJson{{"fold_angles", (*given)[i]}};
+        ObjectReader one(wrapped, fmt::format("{}[{}]", reader_.place_of("fold_angles"), i), "mesh generator");
+        angles.push_back(one.quantity("fold_angles", Dimension::angle, 0.0, Range{10.0 * degree, 180.0 * degree}));
+        if (!one.error()) continue;
+        Error error = *one.error();
+        error.place = one.place();
+        reader_.fail(std::move(error));
+      }
+    }
+    reader_.write("fold_angles", angles);
+    return angles;
+  }
+
+  /// M_G: the keys of M_b, and what its geometry follows in the keys of a coat.
+  MeshSource displaced() {
+    only({"columns", "rows", "mean_edge", "largest_fold", "subdivisions", "mesostructure"});
+    const TrialMeshSettings settings = trial_settings();
+    const double fold = largest_fold();
+    const int subdivisions = reader_.integer("subdivisions", 4, 0, 10);
+    const auto columns = static_cast<double>(settings.columns);
+    const double triangles = 2.0 * columns * settings.rows * std::exp2(2.0 * subdivisions);
+    if (triangles > static_cast<double>(most_displaced_triangles)) {
+      reader_.fail("subdivisions", fmt::format("makes {:.0f} triangles of M_b", triangles),
+                   fmt::format("at most {} triangles", most_displaced_triangles), ErrorCode::too_large);
+    }
+    const SceneJson* relief = reader_.raw("mesostructure");
+    if (relief == nullptr) reader_.fail("mesostructure", "is missing", "an object with the keys of a coat");
+    if (reader_.failed()) return {};
+    Result<TriangleMesh> base = TriangleMesh::build(trial_mesh_b(fold, settings));
+    if (!base) {
+      reader_.fail(std::move(base).error().at(reader_.place()));
+      return {};
+    }
+    Result<Coat> coat = heights_of(*relief, *base);
+    if (!coat) {
+      reader_.fail(std::move(coat).error());
+      return {};
+    }
+    return displaced_mesh(*base, subdivisions, [&](std::uint32_t face, const Vec3& barycentric) {
+      return coat->sample(*base, face, barycentric).height;
+    });
+  }
+
+  Result<Coat> heights_of(const SceneJson& json, const TriangleMesh& base) {
+    const std::string place = reader_.place_of("mesostructure");
+    for (const char* key : {"normals", "normal_map", "green", "stitching"}) {
+      if (!json.is_object() || !json.contains(key)) continue;
+      return Error{ErrorCode::bad_key,
+                   "is not read by M_G, whose geometry follows the heights",
+                   {},
+                   fmt::format("{}.{}", place, key),
+                   "no such key here"};
+    }
+    ASPERITY_TRY(ScenePart<Coat> coat, read_coat(json, place, base, context_));
+    coat.canonical.erase("normals");
+    reader_.write("mesostructure", std::move(coat.canonical));
+    return std::move(coat.value);
+  }
+
   MeshSource cup() {
     only({"rings", "opening", "mean_edge"});
     const int rings = reader_.integer("rings", 8, 1, 512);
@@ -112,10 +195,11 @@ class GeneratorReader {
     return make([&] { return trial_mesh_e(rings, opening, edge); });
   }
   MeshSource strip() {
-    only({"triangles", "mean_edge"});
-    const int triangles = reader_.integer("triangles", 10, 1, 40);
+    only({"triangles", "mean_edge", "grading"});
+    const double grading = reader_.number("grading", 0.5, Range{0.1, 0.9});
+    const int triangles = reader_.integer("triangles", 10, 1, most_graded_triangles(grading));
     const double edge = length("mean_edge", 0.01);
-    return make([&] { return trial_mesh_f(triangles, edge); });
+    return make([&] { return trial_mesh_f(triangles, edge, grading); });
   }
   MeshSource plane() {
     only({"width", "depth", "columns", "rows", "triangles"});
@@ -153,16 +237,17 @@ class GeneratorReader {
   }
 
   ObjectReader& reader_;
+  SceneContext& context_;
 };
 
-Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface) {
+Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface, SceneContext& context) {
   ObjectReader reader(json, surface.place_of("mesh"), "mesh generator");
   if (!reader.failed() && !reader.has("generator")) reader.fail("generator", "is missing", "a generator's name");
   const std::size_t generator = reader.choice("generator", generator_names(), 0);
   ASPERITY_CHECK(reader.status());
   MeshPart part;
-  part.source = GeneratorReader(reader).generate(generator);
   part.name = generator_names()[generator];
+  part.source = GeneratorReader(reader, context).generate(part.name);
   ASPERITY_CHECK(reader.status());
   surface.take("mesh", std::move(reader));
   return part;
@@ -251,13 +336,14 @@ Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
     surface.fail_type("mesh", *mesh, "a mesh file (OBJ, PLY, STL) or an object with a generator");
     return *surface.error();
   }
-  ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface)
+  ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface, context)
                                                 : from_file(mesh->get_ref<const std::string&>(), surface, context));
   const bool stated = surface.has("units") || surface.has("fit");
   const double unit = read_units(surface, part.from_file);
   const double size = read_fit(surface, part.from_file && !stated, context);
   // Generators lay open sheets in z = 0 with their touched side towards +z.
-  const bool flat = !part.from_file && part.name != "icosphere" && part.name != "box" && part.name != "random";
+  const bool closed = part.name == "icosphere" || part.name == "M_d" || part.name == "box" || part.name == "random";
+  const bool flat = !part.from_file && !closed;
   const std::size_t up = surface.choice("up", axis_names(), flat ? 2 : 1);
   ASPERITY_CHECK(surface.status());
 

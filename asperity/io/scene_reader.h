@@ -57,6 +57,10 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
 /// A law as scene files write it; reads back as the same law. A blend map is written as its values. [build]
 SceneJson law_json(const Law& law);
 
+/// A coat's `stitching` object. Writes its canonical copy into `coat`. [build]
+Result<Stitching> read_stitching(const SceneJson& json, const std::string& place, const SceneContext& context,
+                                 ObjectReader& coat);
+
 /// A mesh before it is built: placed, scaled, its axis turned up. [build]
 struct MeshPart {
   MeshSource source;  ///< m

@@ -53,7 +53,11 @@ Result<Material> read_material(const SceneJson* json, ObjectReader& surface, Sce
   material.stiffness = reader.quantity("stiffness", Dimension::stiffness,
                                        std::min(preferred_stiffness, device.max_stiffness), Range::positive());
   material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
+  material.static_friction = reader.number("static_friction", 0.0, Range::not_negative());
+  // Sliding holds less than sticking: without a number of its own, four fifths of it.
+  material.dynamic_friction = reader.number("dynamic_friction", 0.8 * material.static_friction, Range::not_negative());
   ASPERITY_CHECK(reader.status());
+  if (auto valid = validate(material); !valid) return std::move(valid).error().at(surface.place_of("material"));
   if (material.stiffness > device.max_stiffness) {
     context.note(
         fmt::format("material: a stiffness of {:g} N/m is more than the {:g} N/m that {} renders without buzzing",
@@ -93,6 +97,23 @@ Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, Scen
   return mesh;
 }
 
+/// The relief, with a note on what building it had to change.
+Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface, SceneContext& context,
+                             const std::string& name) {
+  static const std::vector<std::string> cures{"cure", "refuse"};
+  static const std::vector<std::string> directions{"least_squares", "relaxed"};
+  ReliefSettings settings;
+  settings.on_overlap = static_cast<OnOverlap>(surface.choice("on_overlap", cures, 0));
+  settings.directions = static_cast<ShellDirections>(surface.choice("shell_directions", directions, 0));
+  ASPERITY_CHECK(surface.status());
+  if (context.progress) context.progress("fitting the relief", 0.0);
+  Result<ReliefSurface> relief = ReliefSurface::build(std::move(base), std::move(coat), settings);
+  if (!relief) return std::move(relief).error().at(surface.place_of("coat"));
+  if (const std::string advice = relief->report().advice(); !advice.empty())
+    context.note(fmt::format("coat on \"{}\": {}", name, advice));
+  return Surface(std::make_shared<const ReliefSurface>(std::move(relief).value()));
+}
+
 }  // namespace
 
 Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context) {
@@ -112,13 +133,13 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
   const SceneJson* coat_json = reader.raw("coat");
   if (coat_json == nullptr) {
+    reader.refuse({"on_overlap", "shell_directions"}, "without a coat");
     instance.surface = std::make_shared<const MeshSurface>(std::move(base));
   } else {
     ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
     reader.write("coat", std::move(coat.canonical));
-    // Maps that differ from face to face need stitching at the edges; one map over them all runs on by itself.
-    instance.law = coat.value.settings().mapping == Mapping::per_face ? Law(MesostructureLaw{}) : Law(HeightFieldLaw{});
-    instance.surface = std::make_shared<const ReliefSurface>(std::move(base), std::move(coat.value));
+    ASPERITY_TRY(instance.surface,
+                 build_relief(std::move(base), std::move(coat.value), reader, context, instance.name));
   }
   reader.write("law", law_json(instance.law));
   if (const SceneJson* law = reader.raw("law")) {

@@ -18,6 +18,20 @@ Status validate(const Material& material) {
     return Error{
         ErrorCode::bad_value, fmt::format("is {}", material.damping), {}, "damping", "a damping of 0 or more (N s/m)"};
   }
+  if (!std::isfinite(material.static_friction) || material.static_friction < 0.0) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {}", material.static_friction),
+                 {},
+                 "static_friction",
+                 "a coefficient of 0 or more"};
+  }
+  if (!(material.dynamic_friction >= 0.0 && material.dynamic_friction <= material.static_friction)) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {}", material.dynamic_friction),
+                 {},
+                 "dynamic_friction",
+                 "a coefficient from 0 to static_friction"};
+  }
   return success();
 }
 

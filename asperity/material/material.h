@@ -4,10 +4,14 @@
 
 namespace asperity {
 
-/// What a surface is made of, as far as the hand can tell. Friction and texture forces join it with their laws.
+/// What a surface is made of, as far as the hand can tell.
 struct Material {
   double stiffness = 1000.0;  ///< N/m, above 0
   double damping = 0.0;       ///< N·s/m along the normal, not negative; it never pulls the probe inward
+  /// Coulomb's coefficients, felt with the proxy law: the proxy sticks while the tangential force is at most
+  /// static_friction times the normal force, and slides with dynamic_friction times it. 0 <= dynamic <= static.
+  double static_friction = 0.0;
+  double dynamic_friction = 0.0;
 };
 
 /// Errors: bad_value, naming the field and what would be accepted. [build]

@@ -9,28 +9,39 @@ namespace {
 // Near the corner of a valley single moves can be a fraction of the skin long and still lead out of it.
 constexpr double tolerance_of_skin = 1e-3;
 
-const MeshSurface& constraint_mesh(const Surface& surface) noexcept {
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();
-  return **std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
+}  // namespace
+
+namespace {
+
+/// Normal of the relief as it is rendered: blended over edges where faces disagree, in the base face's plane.
+Vec3 blended_normal(const ReliefSurface& relief, const Foot& contact) noexcept {
+  const BarycentricFrame frame = barycentric_frame(relief.base().mesh(), contact.element);
+  const HeightJet jet = relief.height(relief.frame(contact.element), contact.barycentric[1], contact.barycentric[2]);
+  return (frame.normal - jet.u * frame.gradient[1] - jet.v * frame.gradient[2]).normalized();
 }
 
-/// Normal of the map, or of the smoothed mesh, on the side that is touched.
-Vec3 shading_normal(const Surface& surface, const Foot& contact) noexcept {
-  const MeshSurface& mesh = constraint_mesh(surface);
+}  // namespace
+
+Vec3 shading_normal(const Instance& instance, const Foot& contact) noexcept {
+  const Surface& surface = instance.surface;
+  const auto* law = std::get_if<ForceShadingLaw>(&instance.law);
+  const bool blended = law != nullptr && law->formulation == Formulation::consistent;
+  const MeshSurface& mesh = *constraint_mesh(instance);
   Vec3 normal = Vec3::Zero();
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) {
-    normal = (*relief)->coat().sample(mesh.mesh(), contact.element, contact.barycentric).normal;
+    const bool given = (*relief)->coat().maps_on(contact.element).has_normal_map();
+    normal = blended && !given ? blended_normal(**relief, contact)
+                               : (*relief)->coat().sample(mesh.mesh(), contact.element, contact.barycentric).normal;
   } else {
     normal = interpolated_normal(mesh.mesh(), contact.element, contact.barycentric);
   }
   return contact.normal.dot(mesh.mesh().face_normal(contact.element)) < 0.0 ? Vec3(-normal) : normal;
 }
 
-}  // namespace
-
 void MeshConstraints::add(const Instance& instance, ContactState& state) noexcept {
-  const MeshSurface& mesh = constraint_mesh(instance.surface);
-  if (!entries_.push_back({&instance, &mesh, &state, instance.world_from_object.is_identity()})) return;
+  if (entries_.size() == capacity) return;
+  const ConstraintGeometry mesh = patches_.of(instance);
+  entries_.push_back({&instance, mesh, &state, instance.world_from_object.is_identity()});
   tolerance_ = std::min(tolerance_, tolerance_of_skin * mesh.skin());
 }
 
@@ -39,12 +50,12 @@ void MeshConstraints::contacts(const Vec3& position, PlaneSet& out) noexcept {
     Entry& entry = entries_[i];
     const Pose& pose = entry.instance->world_from_object;
     ContactSet touched;
-    entry.mesh->contacts(entry.at_origin ? position : pose.apply_inverse(position), radius_, entry.instance->sides,
-                         entry.state->hint, touched);
+    entry.mesh.contacts(entry.at_origin ? position : pose.apply_inverse(position), radius_, entry.instance->sides,
+                        entry.state->hint, touched);
     for (const Foot& contact : touched) {
       const Vec3 normal = entry.at_origin ? contact.normal : pose.rotate(contact.normal);
       const Vec3 point = entry.at_origin ? contact.point : pose.apply(contact.point);
-      out.push_back({normal, normal.dot(point) + radius_, entry.mesh->skin(), static_cast<std::uint32_t>(i), contact});
+      out.push_back({normal, normal.dot(point) + radius_, entry.mesh.skin(), static_cast<std::uint32_t>(i), contact});
     }
   }
 }
@@ -55,45 +66,53 @@ double MeshConstraints::sweep(const Segment& motion) noexcept {
     const Pose& pose = entry.instance->world_from_object;
     const Segment local =
         entry.at_origin ? motion : Segment{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
-    first = std::min(first, entry.mesh->segment(local, radius_, entry.instance->sides, entry.state->hint).t);
+    first = std::min(first, entry.mesh.segment(local, radius_, entry.instance->sides, entry.state->hint).t);
   }
   return first;
 }
 
-LawForce MeshConstraints::force(std::size_t index, const ConstraintSolution& solution, const Vec3& probe,
-                                const Vec3& velocity) const noexcept {
-  const Entry& entry = entries_[index];
-  const Material& material = entry.instance->material;
+LawForce owner_force(const Instance& instance, std::size_t owner, const ConstraintSolution& solution, const Vec3& goal,
+                     const ProbeSample& probe) noexcept {
   LawForce answer;
   Vec3 spring = Vec3::Zero();
   double strongest = 0.0;
+  double strongest_of_all = 0.0;
   const ConstraintPlane* plane = nullptr;
   for (const PlaneProjection::Active& active : solution.projection.active) {
-    if (solution.planes[active.plane].owner != index) continue;
+    strongest_of_all = std::max(strongest_of_all, active.multiplier);
+    if (solution.planes[active.plane].owner != owner) continue;
     spring += active.multiplier * solution.planes[active.plane].normal;
     if (active.multiplier <= strongest) continue;
     strongest = active.multiplier;
     plane = &solution.planes[active.plane];
   }
   if (plane == nullptr) return answer;
-  const Pose& pose = entry.instance->world_from_object;
+  const Pose& pose = instance.world_from_object;
+  const Material& material = instance.material;
   answer.contact = true;
   answer.penetration = spring.norm();
-  Vec3 world_normal = spring / answer.penetration;
-  Vec3 world_force = material.stiffness * spring;
-  if (!solution.converged || !solution.projection.feasible) {
-    // Not at rest yet: the spring runs to where the proxy really is.
-    world_force = material.stiffness * (solution.proxy - probe);
+  answer.normal = spring / answer.penetration;
+  answer.force = material.stiffness * spring;
+  // Not at rest yet: the spring runs to where the proxy really is.
+  const bool settled = solution.converged && solution.projection.feasible;
+  // Once: by the owner that pushes most.
+  if (!settled && strongest != strongest_of_all) return {};
+  if (!settled) answer.force = material.stiffness * (solution.proxy - goal);
+  if (const auto* law = std::get_if<ForceShadingLaw>(&instance.law)) {
+    const Vec3 shading = pose.rotate(shading_normal(instance, plane->contact));
+    if (law->formulation == Formulation::literal) {
+      answer.normal = shading;
+      answer.force = answer.force.norm() * shading;
+    } else {
+      // The slope that the normal stands for, times the push.
+      constexpr double least_rise = 0.1;
+      const double rise = std::max(least_rise, shading.dot(answer.normal));
+      answer.turn = answer.force.norm() / rise * (shading - shading.dot(answer.normal) * answer.normal);
+    }
   }
-  if (std::holds_alternative<ForceShadingLaw>(entry.instance->law)) {
-    const Vec3 shading = shading_normal(entry.instance->surface, plane->contact);
-    world_normal = entry.at_origin ? shading : pose.rotate(shading);
-    world_force = world_force.norm() * world_normal;
-  }
-  world_force = with_damping(world_force, world_normal, velocity, material.damping);
-  answer.force = world_force;
-  answer.normal = world_normal;
-  answer.point = entry.at_origin ? plane->contact.point : pose.apply(plane->contact.point);
+  if (strongest == strongest_of_all) answer.force += material.stiffness * (goal - probe.pose.position);
+  answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
+  answer.point = pose.apply(plane->contact.point);
   answer.element = plane->contact.element;
   return answer;
 }

@@ -10,11 +10,12 @@ namespace {
 
 struct Taper {
   double factor = 1.0;
-  Vec3 gradient = Vec3::Zero();  ///< 1/m
+  double by_u = 0.0;  ///< its change with the barycentric coordinates of the second and third corner
+  double by_v = 0.0;
 };
 
 /// Falls from 1 to 0 over the outer `width` of each barycentric coordinate, smoothly.
-Taper edge_taper(double width, const BarycentricFrame& frame, const Vec3& barycentric) noexcept {
+Taper edge_taper(double width, const Vec3& barycentric) noexcept {
   Taper taper;
   if (width <= 0.0) return taper;
   double value[3];
@@ -25,9 +26,9 @@ Taper edge_taper(double width, const BarycentricFrame& frame, const Vec3& baryce
     slope[k] = 6.0 * t * (1.0 - t) / width;
   }
   taper.factor = value[0] * value[1] * value[2];
-  for (int k = 0; k < 3; ++k) {
-    taper.gradient += slope[k] * value[(k + 1) % 3] * value[(k + 2) % 3] * frame.gradient[k];
-  }
+  const double by[3] = {slope[0] * value[1] * value[2], value[0] * slope[1] * value[2], value[0] * value[1] * slope[2]};
+  taper.by_u = by[1] - by[0];
+  taper.by_v = by[2] - by[0];
   return taper;
 }
 
@@ -45,7 +46,7 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
     const BarycentricFrame frame = barycentric_frame(mesh, face);
     const Vec3 barycentric = frame.coordinates(probe);
     const double height =
-        edge_taper(law.edge_taper, frame, barycentric).factor * surface.coat().sample(mesh, face, barycentric).height;
+        edge_taper(law.edge_taper, barycentric).factor * surface.coat().sample(mesh, face, barycentric).height;
     const double penetration = height - std::abs(frame.height(probe));
     const bool deeper =
         penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
@@ -56,23 +57,31 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
               frame.normal,
               penetration,
               height,
-              face};
+              face,
+              Vec3::Zero()};
   });
   return answer;
 }
 
+/// h - H in shell coordinates, with the owner's own heights.
 LawForce consistent_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe,
                           ContactState& state) noexcept {
-  const BaseFoot foot = base_foot(surface, probe, state.hint);
-  if (!foot.nearest.found()) return {};
-  const TriangleMesh& mesh = surface.base().mesh();
-  const std::uint32_t face = foot.nearest.element;
-  const CoatSample coat = surface.coat().sample(mesh, face, foot.nearest.barycentric);
-  const Taper taper = edge_taper(law.edge_taper, barycentric_frame(mesh, face), foot.nearest.barycentric);
-  const double height = taper.factor * coat.height;
-  const Vec3 gradient = foot.up - taper.factor * coat.gradient - coat.height * taper.gradient;
-  return potential_contact(foot.signed_distance - height, gradient, height, face, foot.beyond_rim, stiffness, probe,
-                           state);
+  const ShellContact at = shell_contact(surface, probe, state.hint);
+  if (!at.found) return {};
+  FieldSample sample = at.located ? surface.own_field(at.frame, at.place) : surface.eval(probe, state.hint);
+  if (at.located && law.edge_taper > 0.0) {
+    // Phi = h - taper H: what own_field gave is h - H.
+    const Taper taper = edge_taper(law.edge_taper, at.place.barycentric());
+    const double height = sample.height;
+    const ShellGradients gradients = shell_gradients(at.frame.prism, at.place);
+    const Vec3 height_gradient = gradients.height - sample.gradient;
+    const Vec3 taper_gradient = taper.by_u * gradients.u + taper.by_v * gradients.v;
+    sample.value = at.place.height - taper.factor * height;
+    sample.gradient = gradients.height - taper.factor * height_gradient - height * taper_gradient;
+    sample.height = taper.factor * height;
+  }
+  return potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim, stiffness,
+                           probe, state);
 }
 
 }  // namespace
@@ -83,19 +92,15 @@ LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surf
                                                  : consistent_force(law, surface, material.stiffness, probe, state);
 }
 
-BaseFoot base_foot(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept {
-  BaseFoot foot;
-  foot.nearest = surface.base().closest(probe, infinity, hint);
-  if (!foot.nearest.found()) return foot;
-  const TriangleMesh& mesh = surface.base().mesh();
-  const Vec3& barycentric = foot.nearest.barycentric;
-  const Vec3 offset = probe - foot.nearest.point;
-  const bool outside = offset.dot(pseudonormal(mesh, foot.nearest.element, barycentric)) >= 0.0;
-  foot.signed_distance = outside ? foot.nearest.distance : -foot.nearest.distance;
-  foot.up = outside ? foot.nearest.normal : Vec3(-foot.nearest.normal);
-  if (foot.nearest.distance == 0.0) foot.up = mesh.face_normal(foot.nearest.element);
-  foot.beyond_rim = beyond_rim(mesh, foot.nearest, probe, surface.skin());
-  return foot;
+ShellContact shell_contact(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept {
+  ShellContact contact;
+  contact.located = surface.locate(probe, hint, contact.frame, contact.place);
+  // The nearest base point, from the patch that locating just used.
+  const Foot nearest = surface.base().closest(probe, infinity, hint);
+  contact.found = nearest.found();
+  if (contact.found && !surface.base().mesh().report().closed())
+    contact.beyond_rim = beyond_rim(surface.base().mesh(), nearest, probe, surface.skin());
+  return contact;
 }
 
 LawForce potential_contact(double value, const Vec3& gradient, double height, std::uint32_t element, bool beyond_rim,

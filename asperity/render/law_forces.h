@@ -16,6 +16,7 @@ struct LawForce {
   double penetration = 0.0;    ///< m
   double height = 0.0;         ///< relief height under the probe (m)
   std::uint32_t element = no_index;
+  Vec3 turn = Vec3::Zero();  ///< N, lateral force of consistent shading, to be added as far as its budget lets it
 };
 
 /// haptic-textures-2005, 3.3; hrm-2010, Algorithm 1. `probe` and `velocity` in the object frame. [servo]
@@ -25,14 +26,15 @@ LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surf
 LawForce mesostructure_force(const MesostructureLaw& law, const ReliefSurface& surface, const Material& material,
                              const Vec3& probe, ContactState& state) noexcept;
 
-/// The base under a probe, as the consistent forms of Algorithms 1 and 2 need it.
-struct BaseFoot {
-  Foot nearest;
-  Vec3 up = Vec3::Zero();  ///< gradient of the signed distance
-  double signed_distance = infinity;
+/// The shell around a probe, as the consistent forms of Algorithms 1 and 2 need it.
+struct ShellContact {
+  bool found = false;       ///< false: no surface
+  bool located = false;     ///< false: no prism holds the probe, the nearest base point stands in
   bool beyond_rim = false;  ///< the foot is on the rim of an open mesh and the probe is not over the face
+  ReliefFrame frame;
+  ShellPlace place;
 };
-BaseFoot base_foot(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept;
+ShellContact shell_contact(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept;
 
 /// Contact of a potential k Phi^2 / 2 whose penetration is -value: force = -k value gradient, if the probe came in from
 /// outside. Keeps state.seen_outside. [servo]

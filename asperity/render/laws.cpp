@@ -25,29 +25,44 @@ Error option_error(std::string option, double value, std::string accepted) {
 std::string law_name(const Law& law) {
   const auto suffix = [](Formulation f) { return f == Formulation::literal ? std::string("-literal") : std::string(); };
   return std::visit(Overloaded{
+                        [](const ProxyLaw&) { return std::string("proxy"); },
                         [](const GodObjectLaw&) { return std::string("god-object"); },
-                        [](const ForceShadingLaw&) { return std::string("force-shading"); },
+                        [&](const ForceShadingLaw& l) { return "force-shading" + suffix(l.formulation); },
                         [&](const HeightFieldLaw& l) { return "height-field" + suffix(l.formulation); },
                         [&](const MesostructureLaw& l) { return "mesostructure" + suffix(l.formulation); },
+                        [](const GeneratedGeometryLaw&) { return std::string("generated-geometry"); },
+                        [](const DenseMeshLaw&) { return std::string("dense-mesh"); },
                     },
                     law);
 }
 
 const std::vector<std::string>& law_names() {
-  static const std::vector<std::string> names{"god-object",           "force-shading", "height-field",
-                                              "height-field-literal", "mesostructure", "mesostructure-literal"};
+  static const std::vector<std::string> names{"proxy",
+                                              "god-object",
+                                              "force-shading",
+                                              "force-shading-literal",
+                                              "height-field",
+                                              "height-field-literal",
+                                              "mesostructure",
+                                              "mesostructure-literal",
+                                              "generated-geometry",
+                                              "dense-mesh"};
   return names;
 }
 
 Result<Law> law_by_name(std::string_view name) {
   // The 2005 paper forces heights to 0 at the edges; it gives no width, so the later paper's band is taken.
   constexpr double literal_taper = 0.05;
+  if (name == "proxy") return Law(ProxyLaw{});
   if (name == "god-object") return Law(GodObjectLaw{});
   if (name == "force-shading") return Law(ForceShadingLaw{});
+  if (name == "force-shading-literal") return Law(ForceShadingLaw{Formulation::literal});
   if (name == "height-field") return Law(HeightFieldLaw{});
   if (name == "height-field-literal") return Law(HeightFieldLaw{Formulation::literal, literal_taper});
   if (name == "mesostructure") return Law(MesostructureLaw{});
   if (name == "mesostructure-literal") return Law(MesostructureLaw{Formulation::literal, 0.05, Blend::s_shape, {}});
+  if (name == "generated-geometry") return Law(GeneratedGeometryLaw{});
+  if (name == "dense-mesh") return Law(DenseMeshLaw{});
   std::string list;
   for (const std::string& known : law_names()) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, law_names());
@@ -63,42 +78,27 @@ Status validate(const Law& law) {
     const double taper = height_field->edge_taper;
     if (!(taper >= 0.0 && taper <= 1.0 / 3.0)) return option_error("edge_taper", taper, "0 to 1/3");
   }
+  if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
+    if (generated->subdivisions < 1 || generated->subdivisions > most_generated_subdivisions)
+      return option_error("subdivisions", generated->subdivisions, fmt::format("1 to {}", most_generated_subdivisions));
+    if (!(generated->influence_radius >= 0.0 && std::isfinite(generated->influence_radius)))
+      return option_error("influence_radius", generated->influence_radius, "a length of 0 or more (m, mm)");
+  }
+  if (const auto* dense = std::get_if<DenseMeshLaw>(&law); dense != nullptr && dense->subdivisions < 0)
+    return option_error("subdivisions", dense->subdivisions, "1 or more, or 0 to choose them by the texels");
   if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
-    if (!(meso->rho > 0.0 && meso->rho <= 1.0 / 3.0)) return option_error("rho", meso->rho, "above 0, at most 1/3");
-    if (meso->blend == Blend::image) {
-      if (meso->blend_map.size() < 2) {
-        return Error{
-            ErrorCode::bad_value, "has fewer than two values", {}, "blend_map", "an image at least two pixels wide"};
-      }
-      for (const double value : meso->blend_map) {
-        if (!(value >= 0.0 && value <= 1.0)) return option_error("blend_map", value, "weights from 0 to 1");
-      }
-      if (meso->blend_map.back() <= 0.0)
-        return option_error("blend_map", meso->blend_map.back(), "a weight above 0 at its right (inner) end");
+    const MesostructureLaw plain;
+    const bool given = meso->rho != plain.rho || meso->blend != plain.blend || !meso->blend_map.empty();
+    if (meso->formulation == Formulation::consistent && given) {
+      return Error{ErrorCode::bad_value,
+                   "is the literal form's: the consistent one blends as the coat's stitching says",
+                   {},
+                   meso->rho != plain.rho ? "rho" : "blend",
+                   "coat.stitching, or formulation \"literal\""};
     }
+    return validate(Stitching{FoldMode::keep, meso->blend, meso->rho, meso->blend_map});
   }
   return success();
-}
-
-BlendValue blend_value(const MesostructureLaw& law, double barycentric) noexcept {
-  const double scale = 1.0 / (2.0 * law.rho);
-  const double t = (barycentric + law.rho) * scale;
-  if (t <= 0.0) return {0.0, 0.0};
-  if (t >= 1.0) return {law.blend == Blend::image ? law.blend_map.back() : 1.0, 0.0};
-  switch (law.blend) {
-    case Blend::none: return {t >= 0.5 ? 1.0 : 0.0, 0.0};
-    case Blend::linear: return {t, scale};
-    case Blend::s_shape: return {t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * scale};
-    case Blend::image: {
-      const double position = t * static_cast<double>(law.blend_map.size() - 1);
-      const auto cell = std::min(static_cast<std::size_t>(position), law.blend_map.size() - 2);
-      const double low = law.blend_map[cell];
-      const double step = law.blend_map[cell + 1] - low;
-      return {low + step * (position - static_cast<double>(cell)),
-              step * static_cast<double>(law.blend_map.size() - 1) * scale};
-    }
-  }
-  return {1.0, 0.0};
 }
 
 }  // namespace asperity

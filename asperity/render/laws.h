@@ -7,11 +7,17 @@
 #include <vector>
 
 #include "asperity/core/result.h"
+#include "asperity/surface/stitching.h"
 
 namespace asperity {
 
 /// As printed in the paper, its defects included, for reproduction; or with its errata resolved.
 enum class Formulation { literal, consistent };
+
+/// The default: one proxy on the true surface, the displaced one where there is a coat (formulation D6, amendments 5 to
+/// 9). It never passes through, moves only where its distance to the probe falls, sticks and slides by Coulomb's cone
+/// of the material, and touches with the probe's radius. Several surfaces are solved jointly.
+struct ProxyLaw {};
 
 /// Constraint-based god-object on the geometry (Zilles and Salisbury 1995; a ball where the probe has a radius, Ruspini
 /// 1997). Each tick ends with the complete solve: the proxy is the constrained local minimiser of its distance to the
@@ -20,8 +26,14 @@ struct GodObjectLaw {};
 
 /// God-object force turned into the direction of the coat's normal map at the contact, or of the interpolated vertex
 /// normals on a bare mesh (Morgenbesser and Srinivasan 1996; force mapping of haptic-textures-2005, 3.2). Its magnitude
-/// stays, so it renders no height, and it feeds energy (0.89 mJ a loop in the reference case). As printed only.
-struct ForceShadingLaw {};
+/// stays, so it renders no height, and it feeds energy (0.89 mJ a loop in the reference case).
+///   literal     as printed
+///   consistent  the normal part of the force stays, the lateral part is that of the blended relief's slope. What it
+///               does to the hand is kept in a budget that only its own resistance fills: it never gives more than it
+///               took
+struct ForceShadingLaw {
+  Formulation formulation = Formulation::consistent;
+};
 
 /// Height field over the base triangle (haptic-textures-2005, 3.3; hrm-2010, Algorithm 1).
 ///   literal     in the prism, penetration = H - |distance to the plane|, force along the plane's normal; contact is
@@ -37,23 +49,37 @@ struct HeightFieldLaw {
   double edge_taper = 0.0;
 };
 
-/// Weight over the band around an edge, as a function of t from 0 (outside) to 1 (inside).
-enum class Blend { none, linear, s_shape, image };
-
 /// Mesostructure blended over adjoining faces (hrm-2010, Algorithm 2).
 ///   literal     the printed band test, unsigned distance to one plane, averaged normals that are not unit (errata 1,
-///   2, 4, 5) consistent  blended signed penetration sum w_i (H_i - h_i) / sum w_i over the faces around, its gradient
-///               included: force = -grad(k Phi^2 / 2), continuous where the weights are
+///   2, 4, 5)
+///   consistent  Phi of the relief in shell coordinates, blended as the coat's stitching says, force = -grad(k Phi^2 /
+///   2)
 struct MesostructureLaw {
   Formulation formulation = Formulation::consistent;
-  double rho = 0.05;  ///< width of the band in barycentric coordinates, above 0, at most 1/3
-  Blend blend = Blend::s_shape;
-  std::vector<double> blend_map;  ///< Blend::image: weights at t = 0 … 1, evenly spaced, at least two
+  double rho = 0.05;              ///< literal: width of the band in barycentric coordinates, above 0, at most 1/3
+  Blend blend = Blend::s_shape;   ///< literal: weights over the band
+  std::vector<double> blend_map;  ///< literal, Blend::image: weights at t = 0 … 1, evenly spaced, at least two
 };
 
-using Law = std::variant<GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw>;
+/// God-object on geometry generated per triangle at run time inside the probe's influence area (haptic-textures-2005,
+/// 3.1): base triangles near the proxy are cut into a grid of small flat ones on the displaced surface, anew every
+/// tick. Facets and their edges are felt; where heights of neighbouring faces differ, the seam stays open.
+struct GeneratedGeometryLaw {
+  int subdivisions = 32;          ///< cuts along each edge of a base triangle; 1 to most_generated_subdivisions
+  double influence_radius = 0.0;  ///< m around the proxy within which triangles are made; 0: one and a half of theirs
+};
+inline constexpr int most_generated_subdivisions = 4096;
 
-/// "god-object", "force-shading", "height-field", "mesostructure", with "-literal" appended where it is. [any]
+/// God-object on the relief as a dense mesh, made once when the scene is built: what detail costs as plain geometry.
+struct DenseMeshLaw {
+  int subdivisions = 0;  ///< cuts along each edge of a base triangle; 0: triangles of a texel, if not too many
+};
+
+using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw,
+                         GeneratedGeometryLaw, DenseMeshLaw>;
+
+/// "proxy", "god-object", "force-shading", "height-field", "mesostructure", the last two with "-literal" appended where
+/// it is, "generated-geometry", "dense-mesh". [any]
 std::string law_name(const Law& law);
 /// The law of that name with default options. Errors: bad_value listing the names. [any]
 Result<Law> law_by_name(std::string_view name);
@@ -65,14 +91,15 @@ Status validate(const Law& law);
 /// Whether the law takes part in the joint constraint solve (it moves the proxy) rather than adding a force of its own.
 /// [any]
 constexpr bool constrains(const Law& law) noexcept {
-  return std::holds_alternative<GodObjectLaw>(law) || std::holds_alternative<ForceShadingLaw>(law);
+  return std::holds_alternative<ProxyLaw>(law) || std::holds_alternative<GodObjectLaw>(law) ||
+         std::holds_alternative<ForceShadingLaw>(law) || std::holds_alternative<GeneratedGeometryLaw>(law) ||
+         std::holds_alternative<DenseMeshLaw>(law);
 }
 
-/// Weight of one barycentric coordinate, S((b + rho) / (2 rho)) with its derivative by b (erratum 3). [servo]
-struct BlendValue {
-  double weight;
-  double slope;
-};
-BlendValue blend_value(const MesostructureLaw& law, double barycentric) noexcept;
+/// Whether the law's proxy rests on the displaced surface, smooth or in facets. [any]
+constexpr bool follows_relief(const Law& law) noexcept {
+  return std::holds_alternative<ProxyLaw>(law) || std::holds_alternative<GeneratedGeometryLaw>(law) ||
+         std::holds_alternative<DenseMeshLaw>(law);
+}
 
 }  // namespace asperity

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asperity/core/units.h"
+#include "asperity/surface/relief_mesh.h"
 
 namespace asperity {
 
@@ -17,7 +18,27 @@ std::uint64_t next_epoch() {
 }
 
 bool needs_coat(const Law& law) {
-  return std::holds_alternative<HeightFieldLaw>(law) || std::holds_alternative<MesostructureLaw>(law);
+  return std::holds_alternative<HeightFieldLaw>(law) || std::holds_alternative<MesostructureLaw>(law) ||
+         std::holds_alternative<GeneratedGeometryLaw>(law) || std::holds_alternative<DenseMeshLaw>(law);
+}
+
+/// The relief as a mesh, where the law feels that; the one that the instance brings if it was made from the same.
+Status make_dense(Instance& instance, std::size_t index) {
+  const auto* law = std::get_if<DenseMeshLaw>(&instance.law);
+  if (law == nullptr) {
+    instance.dense.reset();
+    return success();
+  }
+  const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  const std::uint64_t identity = relief.base().index().identity();
+  const int subdivisions = law->subdivisions > 0 ? law->subdivisions : texel_subdivisions(relief);
+  if (instance.dense != nullptr && instance.dense->relief == identity && instance.dense->subdivisions == subdivisions)
+    return success();
+  Result<TriangleMesh> mesh = tessellate(relief, subdivisions);
+  if (!mesh) return std::move(mesh).error().at(fmt::format("surfaces[{}].law", index));
+  instance.dense = std::make_shared<const DenseMesh>(
+      DenseMesh{identity, subdivisions, MeshSurface(TriangleIndex::build(std::move(mesh).value()))});
+  return success();
 }
 
 Status check(const Instance& instance, std::size_t index, double probe_radius) {
@@ -34,7 +55,7 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
         fmt::format("the law \"{}\" needs a coat, and \"{}\" is a bare mesh", law_name(instance.law), instance.name),
         {},
         place + ".law",
-        "god-object or force-shading, or a coat on the mesh"};
+        "proxy, god-object or force-shading, or a coat on the mesh"};
   }
   if (probe_radius > 0.0 && !constrains(instance.law)) {
     return Error{ErrorCode::unsupported_pair,
@@ -42,7 +63,7 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
                              law_name(instance.law), format_length(probe_radius)),
                  {},
                  place + ".law",
-                 "god-object or force-shading, or probe.radius 0"};
+                 "proxy, god-object or force-shading, or probe.radius 0"};
   }
   const Pose& pose = instance.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
@@ -90,6 +111,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius)
   Scene scene;
   for (std::size_t i = 0; i < instances.size(); ++i) {
     ASPERITY_CHECK(check(instances[i], i, probe_radius));
+    ASPERITY_CHECK(make_dense(instances[i], i));
     // Room for the probe and for the skin that it rests on.
     const Box bounds = surface_bounds(instances[i].surface);
     scene.bounds_.push_back(
@@ -110,6 +132,7 @@ Box Scene::world_bounds() const noexcept {
 std::size_t Scene::memory_bytes() const noexcept {
   std::size_t bytes = sizeof(*this);
   for (const Instance& instance : instances_) {
+    if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
     if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
       bytes += (*relief)->base().index().memory_bytes() + (*relief)->coat().memory_bytes();
     } else {

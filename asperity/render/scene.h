@@ -27,21 +27,31 @@ Box surface_bounds(const Surface& surface);
 /// The mesh that carries the surface. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 
+/// A relief as a dense mesh, with what it was made from.
+struct DenseMesh {
+  std::uint64_t relief = 0;  ///< identity of the relief's index
+  int subdivisions = 0;
+  MeshSurface surface;
+};
+
 /// One touchable thing: a surface at a place, felt by a law, of a material.
 struct Instance {
   std::string name;
   Surface surface;
-  Law law = GodObjectLaw{};
+  Law law = ProxyLaw{};
   Material material;
   Sides sides = Sides::both;
   Pose world_from_object;
+  /// Law dense-mesh: what is felt. Filled by Scene::build, which takes one that is here already if it fits.
+  std::shared_ptr<const DenseMesh> dense;
 };
 
 /// Validated and immutable: `step` cannot fail on it. Copies share the surfaces.
 class Scene {
  public:
   /// Validates everything. Errors: unsupported_pair (a law that needs a coat on a bare mesh), bad_value (material, law
-  /// option, probe radius, pose not finite), each with the instance's place. [build]
+  /// option, probe radius, pose not finite), too_large (a dense mesh of too many triangles), each with the instance's
+  /// place. [build]
   static Result<Scene> build(std::vector<Instance> instances, double probe_radius);
 
   [[nodiscard]] std::span<const Instance> instances() const noexcept { return instances_; }

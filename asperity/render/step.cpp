@@ -1,6 +1,6 @@
 #include "asperity/render/step.h"
 
-#include "asperity/render/god_object.h"
+#include "asperity/render/proxy_tick.h"
 
 namespace asperity {
 
@@ -101,7 +101,8 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   }
   const bool first_tick = state.epoch == 0;
   if (first_tick) state.proxy = state.previous_probe = position;
-  if (state.epoch != scene.epoch()) state.contacts.clear();
+  const bool changed = state.epoch != scene.epoch();
+  if (changed) state.contacts.clear();
   state.epoch = scene.epoch();
 
   Box reach;
@@ -109,32 +110,25 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   reach.include(state.proxy);
   reach.include(state.previous_probe);
   if (!update_slots(scene, state, reach.grown(scene.probe_radius()))) tick.out.flags.set(TickFlag::contacts_dropped);
+  // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
+  const Vec3 held = state.proxy;
+  if (changed && state.stiffness > 0.0) state.proxy = reacquired(scene, state);
 
-  MeshConstraints constraints(scene.probe_radius());
   Vec3 shadow = position;
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.instances()[slot.instance];
-    if (constrains(instance.law)) {
-      constraints.add(instance, slot);
-      continue;
-    }
+    if (constrains(instance.law)) continue;
     const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, slot);
     slot.touching = law.contact;
     tick.add(slot.instance, law);
     if (law.contact) shadow = law.point;
   }
-  if (constraints.empty()) {
-    state.proxy = position;
-    tick.out.proxy = shadow;
-  } else {
-    const ConstraintSolution solution = solve_constraints(constraints, state.proxy, position);
-    state.proxy = solution.proxy;
-    tick.out.proxy = solution.converged && solution.projection.feasible ? solution.projection.point : solution.proxy;
-    if (!solution.converged) tick.out.flags.set(TickFlag::not_converged);
-    for (std::size_t i = 0; i < constraints.size(); ++i) {
-      tick.add(constraints.state(i).instance, constraints.force(i, solution, position, probe.twist.linear));
-    }
-  }
+  const ProxyAnswer answer = solve_proxies(scene, state, probe, held);
+  state.proxy = answer.proxy;
+  for (const ProxyAnswer::Part& part : answer.parts) tick.add(part.instance, part.law);
+  tick.out.proxy = answer.parts.empty() ? shadow : answer.felt;
+  tick.out.flags.set(TickFlag::not_converged, !answer.converged);
+  tick.out.flags.set(TickFlag::energy_limited, answer.energy_limited);
   state.previous_probe = position;
   return tick.out;
 }

@@ -2,6 +2,7 @@
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/samples.h"
+#include "asperity/render/energy_tank.h"
 #include "asperity/render/scene.h"
 #include "asperity/surface/surface.h"
 
@@ -14,7 +15,12 @@ struct ContactState {
   /// Force laws without a proxy: the probe has been seen outside, so that being inside now means having come in from
   /// the front. False at the start and after leaving over a rim.
   bool seen_outside = false;
-  bool touching = false;  ///< force laws without a proxy: pushed at the last tick
+  bool touching = false;  ///< pushed at the last tick; for the proxy on a relief: held by the surface at hint.relief
+  bool sliding = false;   ///< proxy: friction was overcome at the last tick
+  Vec3 turned = Vec3::Zero();  ///< consistent force shading: its lateral force of the last tick (N, world)
+  double turn_budget = 0.0;    ///< what that has taken from the hand and not yet given back (J)
+  double side = 1.0;           ///< proxy on a relief: 1 when touched from the front, -1 from the back
+  ReliefPoint point;           ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per
@@ -24,6 +30,10 @@ struct ProxyState {
   std::uint64_t epoch = 0;    ///< of the scene it belongs to; 0: no tick yet
   FixedVector<ContactState, 4> contacts;
   Vec3 previous_probe = Vec3::Zero();  ///< m, world, of the last tick
+  /// Of the spring between probe and proxy: what a tick may hold at most, and what changes of the scene may spend.
+  EnergyTank tank;
+  double stiffness = 0.0;  ///< N/m of that spring as rendered at the last tick; 0: free
+  bool sliding = false;    ///< several surfaces at once: friction was overcome at the last tick
 };
 
 /// One tick: the force that the hand should feel with the probe there (N, world).

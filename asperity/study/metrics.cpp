@@ -244,8 +244,9 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene,
 }
 
 const char* flag_name(std::size_t bit) {
-  constexpr const char* names[] = {"contact",       "not_converged", "started_inside",    "input_not_finite",
-                                   "force_limited", "slew_limited",  "output_not_finite", "contacts_dropped"};
+  constexpr const char* names[] = {"contact",           "not_converged",    "started_inside",
+                                   "input_not_finite",  "force_limited",    "slew_limited",
+                                   "output_not_finite", "contacts_dropped", "energy_limited"};
   return bit < std::size(names) ? names[bit] : "unknown";
 }
 

@@ -30,8 +30,10 @@ const MeshSurface& base_of(const Surface& surface) {
 struct BasePoint {
   std::uint32_t face = no_index;
   Vec3 barycentric = Vec3::Zero();
-  Vec3 up = Vec3::UnitZ();  // gradient of the signed distance from the base
-  double height = 0.0;      // signed distance (m)
+  Vec3 up = Vec3::UnitZ();     // gradient of the signed distance from the base
+  double height = 0.0;         // signed distance (m)
+  double relief = 0.0;         // height of the coat over it (m)
+  Vec3 slope = Vec3::UnitZ();  // gradient of what a coated surface's zero set is
 };
 
 BasePoint base_point(const MeshSurface& base, const Vec3& p, Hint& hint) {
@@ -123,9 +125,11 @@ class SeriesBuilder {
     const MeshSurface& base = base_of(instance->surface);
     const bool proxied = constrains(instance->law);
     const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
-    const BasePoint at = base_point(base, felt, hints_[tick.rendered.contact.instance]);
+    Hint& hint = hints_[tick.rendered.contact.instance];
+    BasePoint at = base_point(base, felt, hint);
     if (at.face == no_index) return;
     const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    in_shell(*instance, felt, hint, at);
     add_height(*instance, at, proxied ? 0.0 : force.dot(at.up) / instance->material.stiffness, force);
     add_direction(*instance, at, force);
     if (const Coat* coat = coat_of(instance->surface)) {
@@ -136,21 +140,43 @@ class SeriesBuilder {
     }
   }
 
+  /// On a coat the shell's coordinates say what is under a point, where its shell reaches.
+  static void in_shell(const Instance& instance, const Vec3& felt, Hint& hint, BasePoint& at) {
+    const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+    if (relief == nullptr) return;
+    ReliefFrame frame;
+    ShellPlace place;
+    if ((*relief)->locate(felt, hint, frame, place)) {
+      const FieldSample sample = (*relief)->field(frame, place);
+      at.face = frame.face;
+      at.barycentric = place.barycentric();
+      at.height = place.height;
+      at.relief = sample.height;
+      at.slope = sample.gradient;
+      return;
+    }
+    const CoatSample sample = (*relief)->coat().sample((*relief)->base().mesh(), at.face, at.barycentric);
+    at.relief = sample.height;
+    at.slope = at.up - sample.gradient;
+  }
+
   void add_height(const Instance& instance, const BasePoint& at, double deflection, const Vec3& force) {
     const Coat* coat = coat_of(instance.surface);
     const TriangleMesh& mesh = base_of(instance.surface).mesh();
     const bool from_behind = force.dot(mesh.face_normal(at.face)) < 0.0 && !coat;
     const double height = from_behind ? -at.height : at.height;
     out_.followed.back() = height + deflection - scene_.probe_radius();
-    out_.relief.back() = coat ? coat->sample(mesh, at.face, at.barycentric).height : 0.0;
+    out_.relief.back() = coat ? at.relief : 0.0;
   }
 
   void add_direction(const Instance& instance, const BasePoint& at, const Vec3& force) {
     if (!(force.norm() >= least_force)) return;
     const TriangleMesh& mesh = base_of(instance.surface).mesh();
     Vec3 reference = mesh.face_normal(at.face);
-    if (const Coat* coat = coat_of(instance.surface)) {
-      reference -= coat->sample(mesh, at.face, at.barycentric).gradient;
+    if (coat_of(instance.surface) != nullptr) {
+      reference = at.slope;
+      // A two-sided sheet touched from behind pushes the other way.
+      if (follows_relief(instance.law) && reference.dot(force) < 0.0) reference = -reference;
     } else if (reference.dot(force) < 0.0) {
       reference = -reference;
     }

@@ -13,6 +13,8 @@ namespace {
 
 // More repeats than this would make slopes that no double, let alone a hand, can follow.
 constexpr double most_repeats = 1e9;
+// Below a third, so that some axis is always above it.
+constexpr double triplanar_threshold = 0.2;
 
 struct TextureFrame {
   Vec2 st;          ///< texture coordinates
@@ -72,30 +74,25 @@ BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face)
   return frame;
 }
 
-Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
-                         const CoatSettings& settings) {
-  if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0 || settings.repeat.maxCoeff() > most_repeats) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {} x {}", settings.repeat.x(), settings.repeat.y()),
-                 {},
-                 "repeat",
-                 "numbers above 0, at most 1e9"};
-  }
-  if (settings.mapping == Mapping::uv && !mesh.has_uvs()) {
-    return Error{ErrorCode::mismatch,
-                 "is \"uv\", but the mesh has no texture coordinates",
-                 {},
-                 "mapping",
-                 "\"triplanar\" or \"per_face\""};
-  }
-  Coat coat;
-  coat.maps_ = std::move(maps);
-  coat.settings_ = settings;
-  const HeightMap& heights = coat.maps_->heights();
-  if (settings.mapping == Mapping::triplanar) {
-    coat.texel_size_ = std::min(coat.maps_->tile().x() / heights.width(), coat.maps_->tile().y() / heights.height());
-    return coat;
-  }
+namespace {
+
+Error bad_repeat(const Vec2& repeat) {
+  return Error{ErrorCode::bad_value,
+               fmt::format("is {} x {}", repeat.x(), repeat.y()),
+               {},
+               "repeat",
+               "numbers above 0, at most 1e9"};
+}
+
+Error bad_mapping(std::string what) {
+  return Error{ErrorCode::mismatch, std::move(what), {}, "mapping", "\"triplanar\" or \"per_face\""};
+}
+
+/// Size of a texel on the surface (m): the median over a sample of the faces; 0 when no face spans any.
+double median_texel(const TriangleMesh& mesh, const Mesostructure& maps, const CoatSettings& settings) {
+  const HeightMap& heights = maps.heights();
+  if (settings.mapping == Mapping::triplanar)
+    return std::min(maps.tile().x() / heights.width(), maps.tile().y() / heights.height());
   std::vector<double> sizes;
   const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
   const std::uint32_t stride = std::max(1U, faces / 4096U);
@@ -110,16 +107,238 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostr
         std::max(texture.gradient_s.norm() * heights.width(), texture.gradient_t.norm() * heights.height());
     if (texels > 0.0 && std::isfinite(texels)) sizes.push_back(1.0 / texels);
   }
-  if (sizes.empty()) {
-    return Error{ErrorCode::mismatch,
-                 "is \"uv\", but the texture coordinates span no area on any face looked at",
-                 {},
-                 "mapping",
-                 "\"triplanar\" or \"per_face\""};
+  if (sizes.empty()) return 0.0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
+/// Marks the vertices at whose edges texture coordinates differ between the two faces, other than by whole repeats.
+/// Empty when there are none.
+std::vector<std::uint8_t> uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool repeats) {
+  std::vector<std::uint8_t> marked;
+  const auto mark = [&](std::uint32_t face, int edge) {
+    if (marked.empty()) marked.resize(mesh.positions().size(), 0);
+    for (int end = 0; end < 2; ++end) marked[mesh.triangles()[face][static_cast<std::size_t>((edge + end) % 3)]] = 1;
+  };
+  const auto same = [&](const Vec2& a, const Vec2& b) {
+    const Vec2 apart = a - b;
+    for (int k = 0; k < 2; ++k) {
+      // Texture coordinates are stored as floats.
+      const double off = repeats ? apart[k] - std::round(apart[k]) : apart[k];
+      if (std::abs(off) > 1e-6 * (1.0 + std::abs(a[k]))) return false;
+    }
+    return true;
+  };
+  const auto corner_of = [&](std::uint32_t face, std::uint32_t vertex) {
+    std::size_t k = 0;
+    while (mesh.triangles()[face][k] != vertex) ++k;
+    return k;
+  };
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto here = corner_coordinates(mesh, face, settings);
+    for (int edge = 0; edge < 3; ++edge) {
+      const std::uint32_t other = mesh.neighbour(face, edge);
+      if (other == no_index || other < face) continue;
+      const auto there = corner_coordinates(mesh, other, settings);
+      Vec2 shift[2];
+      for (int end = 0; end < 2; ++end) {
+        const auto k = static_cast<std::size_t>((edge + end) % 3);
+        const std::size_t j = corner_of(other, mesh.triangles()[face][k]);
+        // An end that does not fit counts as one repeat off.
+        shift[end] = same(here[k], there[j]) ? Vec2(here[k] - there[j]) : Vec2(end + 1.0, 0.0);
+        if (!same(here[k], there[j])) mark(face, edge);
+      }
+      // Both ends fit, but by different whole repeats: the edge runs another way through the map.
+      if ((shift[0] - shift[1]).norm() > 0.5) mark(face, edge);
+    }
   }
-  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
-  coat.texel_size_ = sizes[sizes.size() / 2];
+  return marked;
+}
+
+}  // namespace
+
+Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
+                         const CoatSettings& settings) {
+  return build(mesh, std::vector<std::shared_ptr<const Mesostructure>>{std::move(maps)}, {}, settings);
+}
+
+Result<Coat> Coat::build(const TriangleMesh& mesh, std::vector<std::shared_ptr<const Mesostructure>> maps,
+                         std::vector<std::uint8_t> map_of_face, const CoatSettings& settings) {
+  if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0 || settings.repeat.maxCoeff() > most_repeats)
+    return bad_repeat(settings.repeat);
+  if (auto valid = validate(settings.stitching); !valid) return std::move(valid).error().at("stitching");
+  if (settings.mapping == Mapping::uv && !mesh.has_uvs())
+    return bad_mapping("is \"uv\", but the mesh has no texture coordinates");
+  const auto most = map_of_face.empty() ? std::uint8_t{0} : *std::max_element(map_of_face.begin(), map_of_face.end());
+  if (maps.empty() || most >= maps.size() || (!map_of_face.empty() && map_of_face.size() != mesh.triangles().size())) {
+    return Error{
+        ErrorCode::mismatch,
+        fmt::format("{} maps, {} faces named, {} triangles", maps.size(), map_of_face.size(), mesh.triangles().size()),
+        {},
+        "map_of_face",
+        "one number of a map for every triangle"};
+  }
+  Coat coat;
+  coat.settings_ = settings;
+  coat.lowest_ = infinity;
+  coat.highest_ = -infinity;
+  coat.texel_size_ = infinity;
+  bool repeats = true;
+  for (const auto& one : maps) {
+    const HeightMap& heights = one->heights();
+    coat.lowest_ = std::min(coat.lowest_, heights.lowest());
+    coat.highest_ = std::max(coat.highest_, heights.highest());
+    coat.texel_size_ = std::min(coat.texel_size_, median_texel(mesh, *one, settings));
+    repeats = repeats && heights.wrap() == Wrap::repeat;
+  }
+  if (coat.texel_size_ == 0.0)
+    return bad_mapping("is \"uv\", but the texture coordinates span no area on any face looked at");
+  if (maps.size() > 1) {
+    coat.has_seams_ = true;
+  } else if (settings.mapping != Mapping::triplanar && coat.lowest_ < coat.highest_) {
+    if (settings.mapping == Mapping::uv) coat.seam_vertices_ = uv_seams(mesh, settings, repeats);
+    coat.has_seams_ = settings.mapping == Mapping::per_face || !coat.seam_vertices_.empty();
+  }
+  coat.maps_ = std::move(maps);
+  coat.map_of_face_ = std::move(map_of_face);
   return coat;
+}
+
+std::size_t Coat::memory_bytes() const noexcept {
+  std::size_t bytes =
+      sizeof(*this) + map_of_face_.capacity() + seam_vertices_.capacity() + maps_.capacity() * sizeof(maps_.front());
+  for (const auto& maps : maps_) bytes += maps->memory_bytes();
+  return bytes;
+}
+
+CoatFrame Coat::frame(const TriangleMesh& mesh, std::uint32_t face) const noexcept {
+  CoatFrame frame;
+  frame.maps = &maps_on(face);
+  frame.triplanar = settings_.mapping == Mapping::triplanar;
+  if (!frame.triplanar) {
+    const auto st = corner_coordinates(mesh, face, settings_);
+    frame.st = st[0];
+    frame.st_u = st[1] - st[0];
+    frame.st_v = st[2] - st[0];
+    return frame;
+  }
+  const TriangleMesh::Triangle& t = mesh.triangles()[face];
+  frame.point = mesh.positions()[t[0]];
+  frame.point_u = mesh.positions()[t[1]] - frame.point;
+  frame.point_v = mesh.positions()[t[2]] - frame.point;
+  frame.normal = mesh.vertex_normal(t[0]);
+  frame.normal_u = mesh.vertex_normal(t[1]) - frame.normal;
+  frame.normal_v = mesh.vertex_normal(t[2]) - frame.normal;
+  return frame;
+}
+
+HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
+  if (frame.triplanar) return triplanar_jet(frame, u, v);
+  const HeightCurvature map = frame.maps->heights().curvature(frame.st + u * frame.st_u + v * frame.st_v);
+  const auto second = [&](const Vec2& a, const Vec2& b) {
+    return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
+  };
+  return {map.height,
+          map.gradient.dot(frame.st_u),
+          map.gradient.dot(frame.st_v),
+          second(frame.st_u, frame.st_u),
+          second(frame.st_u, frame.st_v),
+          second(frame.st_v, frame.st_v)};
+}
+
+HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept {
+  const Vec3 point = frame.point + u * frame.point_u + v * frame.point_v;
+  const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
+  const Vec2& tile = frame.maps->tile();
+  HeightJet sum;     // of w H
+  HeightJet weight;  // of w
+  const double length = normal.squaredNorm();
+  const double length_u = normal.dot(frame.normal_u);
+  const double length_v = normal.dot(frame.normal_v);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double n = normal[axis];
+    const double q = n * n - triplanar_threshold * length;
+    if (q <= 0.0) continue;
+    const double nu = frame.normal_u[axis];
+    const double nv = frame.normal_v[axis];
+    const double q_u = 2.0 * (n * nu - triplanar_threshold * length_u);
+    const double q_v = 2.0 * (n * nv - triplanar_threshold * length_v);
+    const double q_uu = 2.0 * (nu * nu - triplanar_threshold * frame.normal_u.squaredNorm());
+    const double q_uv = 2.0 * (nu * nv - triplanar_threshold * frame.normal_u.dot(frame.normal_v));
+    const double q_vv = 2.0 * (nv * nv - triplanar_threshold * frame.normal_v.squaredNorm());
+    const double w = q * q;
+    const HeightJet own{w,
+                        2.0 * q * q_u,
+                        2.0 * q * q_v,
+                        2.0 * (q_u * q_u + q * q_uu),
+                        2.0 * (q_u * q_v + q * q_uv),
+                        2.0 * (q_v * q_v + q * q_vv)};
+    const int s = (axis + 1) % 3;
+    const int t = (axis + 2) % 3;
+    const HeightCurvature map = frame.maps->heights().curvature(Vec2(point[s] / tile.x(), point[t] / tile.y()));
+    const Vec2 st_u(frame.point_u[s] / tile.x(), frame.point_u[t] / tile.y());
+    const Vec2 st_v(frame.point_v[s] / tile.x(), frame.point_v[t] / tile.y());
+    const double hu = map.gradient.dot(st_u);
+    const double hv = map.gradient.dot(st_v);
+    const auto second = [&](const Vec2& a, const Vec2& b) {
+      return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
+    };
+    sum.height += w * map.height;
+    sum.u += own.u * map.height + w * hu;
+    sum.v += own.v * map.height + w * hv;
+    sum.uu += own.uu * map.height + 2.0 * own.u * hu + w * second(st_u, st_u);
+    sum.uv += own.uv * map.height + own.u * hv + own.v * hu + w * second(st_u, st_v);
+    sum.vv += own.vv * map.height + 2.0 * own.v * hv + w * second(st_v, st_v);
+    weight.height += own.height;
+    weight.u += own.u;
+    weight.v += own.v;
+    weight.uu += own.uu;
+    weight.uv += own.uv;
+    weight.vv += own.vv;
+  }
+  const double per = 1.0 / std::max(weight.height, std::numeric_limits<double>::min());
+  HeightJet jet;
+  jet.height = sum.height * per;
+  jet.u = (sum.u - jet.height * weight.u) * per;
+  jet.v = (sum.v - jet.height * weight.v) * per;
+  jet.uu = (sum.uu - 2.0 * jet.u * weight.u - jet.height * weight.uu) * per;
+  jet.uv = (sum.uv - jet.u * weight.v - jet.v * weight.u - jet.height * weight.uv) * per;
+  jet.vv = (sum.vv - 2.0 * jet.v * weight.v - jet.height * weight.vv) * per;
+  return jet;
+}
+
+HeightRange Coat::range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept {
+  const HeightMap& heights = frame.maps->heights();
+  if (!frame.triplanar) {
+    Vec2 lower = Vec2::Constant(infinity);
+    Vec2 upper = Vec2::Constant(-infinity);
+    for (int k = 0; k < 3; ++k) {
+      const Vec2 st = frame.st + corners[k].x() * frame.st_u + corners[k].y() * frame.st_v;
+      lower = lower.cwiseMin(st);
+      upper = upper.cwiseMax(st);
+    }
+    return heights.range_over(lower, upper);
+  }
+  // A weighted mean of three heights lies between their bounds.
+  Vec3 lower = Vec3::Constant(infinity);
+  Vec3 upper = Vec3::Constant(-infinity);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 point = frame.point + corners[k].x() * frame.point_u + corners[k].y() * frame.point_v;
+    lower = lower.cwiseMin(point);
+    upper = upper.cwiseMax(point);
+  }
+  const Vec2& tile = frame.maps->tile();
+  HeightRange all{infinity, -infinity};
+  for (int axis = 0; axis < 3; ++axis) {
+    const int s = (axis + 1) % 3;
+    const int t = (axis + 2) % 3;
+    const HeightRange one = heights.range_over(Vec2(lower[s] / tile.x(), lower[t] / tile.y()),
+                                               Vec2(upper[s] / tile.x(), upper[t] / tile.y()));
+    all.lowest = std::min(all.lowest, one.lowest);
+    all.highest = std::max(all.highest, one.highest);
+  }
+  return all;
 }
 
 CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
@@ -130,11 +349,12 @@ CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3
 CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
   const BarycentricFrame frame = barycentric_frame(mesh, face);
   const TextureFrame texture = texture_frame(mesh, face, frame, barycentric, settings_);
-  const MesostructureSample maps = maps_->sample(texture.st);
+  const Mesostructure& own = maps_on(face);
+  const MesostructureSample maps = own.sample(texture.st);
   CoatSample sample;
   sample.height = maps.height;
   sample.gradient = maps.gradient.x() * texture.gradient_s + maps.gradient.y() * texture.gradient_t;
-  if (maps_->has_normal_map()) {
+  if (own.has_normal_map()) {
     // The map's axes as they lie on the triangle: along growing s and growing t.
     const Vec3 tangent = unit_or_zero(texture.gradient_s);
     const Vec3 bitangent = unit_or_zero(texture.gradient_t);
@@ -149,6 +369,7 @@ CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const
 CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
                                   const Vec3& barycentric) const noexcept {
   const BarycentricFrame frame = barycentric_frame(mesh, face);
+  const Mesostructure& own = maps_on(face);
   const TriangleMesh::Triangle& corners = mesh.triangles()[face];
   Vec3 point = Vec3::Zero();
   Vec3 normal = Vec3::Zero();
@@ -160,28 +381,31 @@ CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
     normal += weight * vertex_normal;
     normal_gradient += vertex_normal * frame.gradient[i].transpose();
   }
-  // Fourth powers of the components, not yet divided by their sum.
-  const Vec3 power = normal.array().square().square();
+  // Not yet divided by their sum.
+  const Vec3 excess = (normal.array().square() - triplanar_threshold * normal.squaredNorm()).max(0.0);
+  const Vec3 power = excess.array().square();
   const double total = std::max(power.sum(), std::numeric_limits<double>::min());
   double height = 0.0;
   Vec3 weighted_gradient = Vec3::Zero();
   Vec3 shading_gradient = Vec3::Zero();
   Vec3 total_gradient = Vec3::Zero();
   for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 square_gradient = normal_gradient.transpose() * normal;
     const Vec3 power_gradient =
-        4.0 * normal[axis] * normal[axis] * normal[axis] * normal_gradient.row(axis).transpose();
+        4.0 * excess[axis] *
+        (normal[axis] * normal_gradient.row(axis).transpose() - triplanar_threshold * square_gradient);
     total_gradient += power_gradient;
     if (power[axis] <= 0.0) continue;
     const int s = (axis + 1) % 3;
     const int t = (axis + 2) % 3;
-    const Vec2 tile = maps_->tile();
-    const MesostructureSample maps = maps_->sample(Vec2(point[s] / tile.x(), point[t] / tile.y()));
+    const Vec2 tile = own.tile();
+    const MesostructureSample maps = own.sample(Vec2(point[s] / tile.x(), point[t] / tile.y()));
     Vec3 slope = Vec3::Zero();
     slope[s] = maps.gradient.x() / tile.x();
     slope[t] = maps.gradient.y() / tile.y();
     height += power[axis] * maps.height;
     weighted_gradient += power[axis] * slope + maps.height * power_gradient;
-    if (maps_->has_normal_map()) {
+    if (own.has_normal_map()) {
       const Vec2 given = slope_of(maps.normal);
       slope[s] = given.x();
       slope[t] = given.y();
@@ -192,7 +416,7 @@ CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
   sample.height = height / total;
   const Vec3 gradient = (weighted_gradient - sample.height * total_gradient) / total;
   sample.gradient = gradient - gradient.dot(frame.normal) * frame.normal;
-  const Vec3 shading = maps_->has_normal_map() ? Vec3(shading_gradient / total) : gradient;
+  const Vec3 shading = own.has_normal_map() ? Vec3(shading_gradient / total) : gradient;
   sample.normal = (frame.normal - (shading - shading.dot(frame.normal) * frame.normal)).normalized();
   return sample;
 }

@@ -5,20 +5,24 @@
 #include "asperity/core/result.h"
 #include "asperity/field/mesostructure.h"
 #include "asperity/geometry/mesh.h"
+#include "asperity/surface/stitching.h"
 
 namespace asperity {
 
 /// How texture coordinates are found on a triangle.
 ///   per_face   every triangle carries the map's lower left, lower right and (1/2, sqrt(3)/2): equilateral triangles
-///   keep angles uv         the mesh's own corner UVs, times `repeat` triplanar  the position projected along the three
-///   axes, one tile of the map each, mixed by the fourth powers of the
-///              smooth normal's components: continuous over every edge, no UVs needed
+///              keep angles
+///   uv         the mesh's own corner UVs, times `repeat`
+///   triplanar  the position projected along the three axes, one tile of the map each, mixed by the smooth normal n:
+///              axis a weighs max(0, n_a^2 - |n|^2 / 5)^2, so that within about 27 degrees of an axis it is alone.
+///              Continuous over every edge, no UVs needed
 enum class Mapping { per_face, uv, triplanar };
 
 /// How a mesostructure lies on a mesh.
 struct CoatSettings {
   Mapping mapping = Mapping::uv;
   Vec2 repeat = Vec2::Ones();  ///< uv and per_face: how often the map fits into one unit of texture coordinate, above 0
+  Stitching stitching = {};    ///< how heights are joined where neighbouring faces disagree
 };
 
 /// The coat at one place of one triangle, object frame.
@@ -29,27 +33,73 @@ struct CoatSample {
       Vec3::Zero();  ///< unit normal of the relief: the given normal map's where there is one, else from `gradient`
 };
 
+/// Height over one triangle as a function of its barycentric coordinates (u, v) of the second and third corner.
+struct HeightJet {
+  double height = 0.0;  ///< m
+  double u = 0.0;       ///< dH/du (m)
+  double v = 0.0;
+  double uu = 0.0;  ///< second derivatives (m)
+  double uv = 0.0;
+  double vv = 0.0;
+};
+
+/// The mapping of one triangle, ready to be sampled: what a probe that stays on it need not fetch again.
+struct CoatFrame {
+  const Mesostructure* maps = nullptr;
+  bool triplanar = false;
+  Vec2 st = Vec2::Zero();  ///< flat mappings: texture coordinates of the first corner, and their change along u and v
+  Vec2 st_u = Vec2::Zero();
+  Vec2 st_v = Vec2::Zero();
+  Vec3 point = Vec3::Zero();  ///< triplanar: position over tile of the first corner, and its change along u and v
+  Vec3 point_u = Vec3::Zero();
+  Vec3 point_v = Vec3::Zero();
+  Vec3 normal = Vec3::Zero();  ///< triplanar: smooth normal of the first corner, and its change
+  Vec3 normal_u = Vec3::Zero();
+  Vec3 normal_v = Vec3::Zero();
+};
+
 /// A mesostructure laid on a mesh (hrm-2010, section 4). Immutable; shares the maps with other coats.
 class Coat {
  public:
   /// Errors: bad_value (repeat), mismatch (uv mapping on a mesh without UVs, or with UVs that span no area). [build]
   static Result<Coat> build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
                             const CoatSettings& settings);
+  /// Different mesostructures on the faces of one mesh: face i wears maps[map_of_face[i]]. Errors: those above, and
+  /// mismatch (one entry a face, each naming a map). [build]
+  static Result<Coat> build(const TriangleMesh& mesh, std::vector<std::shared_ptr<const Mesostructure>> maps,
+                            std::vector<std::uint8_t> map_of_face, const CoatSettings& settings);
 
   /// The coat over the point of `face` with these barycentric coordinates, which may lie outside the triangle (its
   /// plane and its mapping are continued): stitching needs that. [servo]
   [[nodiscard]] CoatSample sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept;
 
+  /// What sampling on `face` needs of the mesh. [servo]
+  [[nodiscard]] CoatFrame frame(const TriangleMesh& mesh, std::uint32_t face) const noexcept;
+  /// The face's own height with its derivatives, before any stitching; (u, v) may lie outside the triangle. [servo]
+  [[nodiscard]] HeightJet jet(const CoatFrame& frame, double u, double v) const noexcept;
+  /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
+  [[nodiscard]] HeightRange range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// Whether heights may differ between neighbours at some edge, so that they have to be stitched. [any]
+  [[nodiscard]] bool has_seams() const noexcept { return has_seams_; }
+  /// Whether some edge at `vertex` is one of them. [servo]
+  [[nodiscard]] bool seam_at(std::uint32_t vertex) const noexcept {
+    return has_seams_ && (seam_vertices_.empty() || seam_vertices_[vertex] != 0);
+  }
+
   /// Bounds of every height of the coat (m), overshoot of the reconstruction included. [any]
-  [[nodiscard]] double lowest() const noexcept { return maps_->heights().lowest(); }
-  [[nodiscard]] double highest() const noexcept { return maps_->heights().highest(); }
+  [[nodiscard]] double lowest() const noexcept { return lowest_; }
+  [[nodiscard]] double highest() const noexcept { return highest_; }
   /// mh of the papers: the largest absolute height (m). [any]
   [[nodiscard]] double amplitude_bound() const noexcept { return std::max(std::abs(lowest()), std::abs(highest())); }
   /// Size of one texel on the surface (m), the median over the faces: the finest thing that can be felt. [any]
   [[nodiscard]] double texel_size() const noexcept { return texel_size_; }
-  [[nodiscard]] const Mesostructure& maps() const noexcept { return *maps_; }
+  /// The first mesostructure, and the one on a face. [any]
+  [[nodiscard]] const Mesostructure& maps() const noexcept { return *maps_.front(); }
+  [[nodiscard]] const Mesostructure& maps_on(std::uint32_t face) const noexcept {
+    return map_of_face_.empty() ? *maps_.front() : *maps_[map_of_face_[face]];
+  }
   [[nodiscard]] const CoatSettings& settings() const noexcept { return settings_; }
-  [[nodiscard]] std::size_t memory_bytes() const noexcept { return sizeof(*this) + maps_->memory_bytes(); }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
   Coat() = default;
@@ -58,8 +108,15 @@ class Coat {
   [[nodiscard]] CoatSample sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
                                             const Vec3& barycentric) const noexcept;
 
-  std::shared_ptr<const Mesostructure> maps_;
+  [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;
+
+  std::vector<std::shared_ptr<const Mesostructure>> maps_;
+  std::vector<std::uint8_t> map_of_face_;  ///< empty: the first map everywhere
   CoatSettings settings_;
+  double lowest_ = 0.0;
+  double highest_ = 0.0;
+  bool has_seams_ = false;
+  std::vector<std::uint8_t> seam_vertices_;  ///< one a vertex; empty: where there are seams, they are everywhere
   double texel_size_ = 0.0;
 };
 

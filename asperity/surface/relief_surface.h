@@ -1,41 +1,129 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "asperity/surface/coat.h"
 #include "asperity/surface/mesh_surface.h"
 #include "asperity/surface/prisms.h"
+#include "asperity/surface/relief_frame.h"
 
 namespace asperity {
 
-/// A base mesh that wears a coat of relief.
+/// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
+enum class OnOverlap {
+  cure,    ///< turn the directions where that helps, then lower the relief around the vertices at fault, and report it
+  refuse,  ///< Error naming the faces and vertices
+};
+
+/// How a relief is made from a base and a coat.
+struct ReliefSettings {
+  ShellDirections directions = ShellDirections::least_squares;
+  OnOverlap on_overlap = OnOverlap::cure;
+};
+
+/// What building a relief found out.
+struct ReliefReport {
+  std::vector<std::uint32_t> faces_at_fault;  ///< whose prism folds over within the coat's heights, before any cure
+  std::vector<std::uint32_t> blind_vertices;  ///< without a direction that all their faces see from the front
+  double fitting_share = 1.0;                 ///< of the coat's amplitude at which every prism is one to one; 0: none
+  std::uint32_t lowered_vertices = 0;         ///< where the cure renders less than the coat's height
+  double least_share = 1.0;                   ///< the least of what is rendered there
+  bool directions_relaxed = false;            ///< the cure turned the directions
+  std::uint32_t overlapping_pairs = 0;        ///< of faces without a common vertex whose reliefs' bounds meet in space
+  [[nodiscard]] bool fits() const noexcept { return faces_at_fault.empty() && blind_vertices.empty(); }
+  /// One sentence on what is wrong and what would cure it; empty when all fits. [any]
+  [[nodiscard]] std::string advice() const;
+};
+
+/// A base mesh that wears a coat of relief: the displaced surface x = V + H N itself (formulation D2, D3).
 ///
-/// The displaced surface is the zero set of value(p) = h - H: h the signed distance of p from the base mesh, H the
-/// height of the coat over the nearest base point. That is continuous over convex edges (where many points share one
-/// base point) wherever H is, and steps where the nearest base point jumps: inside concave folds. Shell coordinates,
-/// which remove that limit, take the place of `eval` and `segment` behind the same queries.
+/// Over each triangle x is a smooth function of the barycentric coordinates; neighbours share directions and, through
+/// stitching, heights, so that the surface is closed wherever the base is. All queries are about that surface. On an
+/// open base the relief ends at the rim.
 class ReliefSurface {
  public:
+  /// Errors: bad_mesh (a relief that folds over, when `settings` refuse that), naming faces, vertices and the largest
+  /// share of the amplitude that fits. [build]
+  static Result<ReliefSurface> build(MeshSurface base, Coat coat, const ReliefSettings& settings = {});
+  /// The same with the default settings, which cannot fail. [build]
   ReliefSurface(MeshSurface base, Coat coat);
 
-  /// First point of a motion where value(p) = radius, from either side unless `sides` is front (then only from
-  /// outside). Steps are as long as the slopes' bound allows, and at least a quarter of a texel or of the height over
-  /// the relief: a feature thinner than that along the motion can be stepped over.
+  /// First point of a motion where a ball of `radius` touches. A point's is exact: no relief, however thin, is stepped
+  /// over. A ball moves in steps of half its radius, each checked at its end. [servo]
   [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
+  /// The same for a point that slides on the relief from one face to another: what belongs to these faces, or shares a
+  /// vertex with one of them, is not met. For folds that overlap in space. [servo]
+  [[nodiscard]] SweptHit segment_elsewhere(const Segment& motion, Sides sides, std::uint32_t from_face,
+                                           std::uint32_t to_face, Hint& hint) const noexcept;
   void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept;
-  /// The foot of p by the first-order distance value / |gradient|, moved along the gradient. Reaches as far as the base
-  /// lies within `bound` plus the coat's height.
+  /// The nearest point of the displaced surface. `normal` is that of the surface, turned towards p. [servo]
   [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept;
+  /// Phi = h - H in shell coordinates, blended where faces are stitched, and its gradient. Not a distance: its gradient
+  /// is as long as the relief is steep. Where the shell does not reach, the nearest base point's own. [servo]
   [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
-  [[nodiscard]] double skin() const noexcept { return base_.skin(); }
-  [[nodiscard]] Box bounds() const noexcept { return base_.bounds().grown(coat_.amplitude_bound()); }
+  [[nodiscard]] double skin() const noexcept { return skin_; }
+  [[nodiscard]] Box bounds() const noexcept { return base_.bounds().grown(reach_); }
+
+  /// What evaluating the relief over `face` needs. [servo]
+  [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept;
+  /// Height as rendered over a place of the frame's triangle. [servo]
+  [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// The displaced surface over it. [servo]
+  [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// Bounds of the height as rendered, over the triangle with these corners. [servo]
+  [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. False where no
+  /// prism holds p. [servo]
+  [[nodiscard]] bool locate(const Vec3& p, Hint& hint, ReliefFrame& frame, ShellPlace& place) const noexcept;
+  /// Value and gradient of Phi at a located place. [servo]
+  [[nodiscard]] FieldSample field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  /// Value and gradient of h - H with the face's own height, not stitched (Algorithm 1). [servo]
+  [[nodiscard]] FieldSample own_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
 
   [[nodiscard]] const MeshSurface& base() const noexcept { return base_; }
   [[nodiscard]] const Coat& coat() const noexcept { return coat_; }
+  [[nodiscard]] const Shell& shell() const noexcept { return shell_; }
+  [[nodiscard]] const ReliefReport& report() const noexcept { return report_; }
   [[nodiscard]] Prisms prisms() const noexcept { return {base_.mesh(), coat_.amplitude_bound()}; }
+  /// Smallest length (m) over which the relief changes: steps along the surface are measured by it. [any]
+  [[nodiscard]] double grain() const noexcept { return grain_; }
+  /// Whether heights of neighbouring faces may differ at their edge (no blend was asked for). [any]
+  [[nodiscard]] bool has_jumps() const noexcept { return coat_.has_seams() && bands_.empty(); }
+  /// Whether the relief of a face without a common vertex comes into that of `face`. [servo]
+  [[nodiscard]] bool overlapped(std::uint32_t face) const noexcept {
+    return !overlapped_.empty() && overlapped_[face] != 0;
+  }
+  /// How far the displaced surface is from its base at most (m). [any]
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// Bytes of coat, base, search structure and shell. [any]
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
+  [[nodiscard]] SweptHit ball_segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
+  template <class Skip>
+  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, Hint& hint, const Skip& skip) const noexcept;
+  Result<bool> fit(const ReliefSettings& settings);
+  void lower(const std::vector<double>& share_of_face);
+  void find_overlaps();
+  [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
+  template <class Visit>
+  void for_each_partner(const ReliefFrame& frame, double u, double v, Visit&& visit) const noexcept;
+
   MeshSurface base_;
   Coat coat_;
-  double lipschitz_ = 1.0;  ///< bound on |gradient of value| that a step may rely on
+  Shell shell_;
+  std::vector<StitchBand> bands_;         ///< one a face, or empty: nothing to stitch
+  std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
+  std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
+  ReliefReport report_;
+  double reach_ = 0.0;
+  double skin_ = 0.0;
+  double grain_ = 0.0;
+  double fold_depth_ = 0.0;  ///< by how much rounding folds may move the surface (m)
 };
 static_assert(SurfaceQuery<ReliefSurface> && HasPrisms<ReliefSurface>);
 

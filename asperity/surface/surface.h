@@ -9,6 +9,7 @@
 #include "asperity/core/math.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/triangle_patch.h"
+#include "asperity/surface/relief_frame.h"
 
 namespace asperity {
 
@@ -16,6 +17,7 @@ namespace asperity {
 /// never trusted, free to be thrown away. One per probe and instance. [servo]
 struct Hint {
   TrianglePatch patch;
+  ReliefPlace relief;
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.

@@ -98,7 +98,7 @@ TEST_F(Program, TouchWritesTraceNumbersAndReport) {
   const Call call = run("touch quick.json");
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_LE(std::count(call.out.begin(), call.out.end(), '\n'), 12);
-  for (const char* part : {"quick", "height-field", "force", "height", "p99.9", "flags", "out/quick/report.html"})
+  for (const char* part : {"quick", "proxy", "force", "height", "p99.9", "flags", "out/quick/report.html"})
     EXPECT_TRUE(has(call.out, part)) << part;
   const std::string page = read("out/quick/report.html");
   EXPECT_TRUE(has(page, "<html")) << page.size();
@@ -127,14 +127,14 @@ TEST_F(Program, TouchTwiceIsBitEqual) {
 TEST_F(Program, AMeshAndAMapAreEnough) {
   const Call bare = run("touch ball.obj --no-report --json --speed 100mm/s");
   ASSERT_EQ(bare.code, 0) << bare.err;
-  EXPECT_EQ(json::parse(bare.out)["law"], "god-object");
+  EXPECT_EQ(json::parse(bare.out)["law"], "proxy");
   EXPECT_TRUE(has(bare.err, "states no unit"));
   const Call relief =
       run("touch ball.obj --relief map.png --height 0.5mm --tile 20mm --no-report --json --speed 100mm/s --csv "
           "--device omega.7 --force 1N");
   ASSERT_EQ(relief.code, 0) << relief.err;
   const json document = json::parse(relief.out);
-  EXPECT_EQ(document["law"], "height-field");
+  EXPECT_EQ(document["law"], "proxy");
   EXPECT_EQ(document["scene"], "ball");
   EXPECT_TRUE(has(document["setup"]["stroke"].get<std::string>(), "pressed with 1 N"));
   EXPECT_TRUE(has(document["setup"]["device"].get<std::string>(), "omega.7"));

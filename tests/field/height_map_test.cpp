@@ -21,6 +21,7 @@ constexpr Wrap both_wraps[] = {Wrap::repeat, Wrap::clamp};
 
 static_assert(noexcept(std::declval<const HeightMap&>().sample(std::declval<const Vec2&>())));
 static_assert(noexcept(std::declval<const HeightMap&>().height_at(std::declval<const Vec2&>())));
+static_assert(noexcept(std::declval<const HeightMap&>().curvature(std::declval<const Vec2&>())));
 
 /// Heights from a formula at the texel centres.
 template <class Formula>
@@ -105,6 +106,31 @@ TEST(HeightMapCosine, BilinearConvergesWithSecondOrderHeightsAndFirstOrderGradie
   const Errors fine = cosine_errors(64, Reconstruction::bilinear);
   EXPECT_NEAR(coarse.height / fine.height, 4.0, 0.8);
   EXPECT_NEAR(coarse.gradient / fine.gradient, 2.0, 0.4);
+}
+
+/// Largest error of the spline's second derivatives.
+double cosine_curvature_error(int size) {
+  const auto relief = [](double s, double t) { return std::cos(4.0 * pi * s) * std::cos(2.0 * pi * t); };
+  const HeightMap map =
+      map_of(tabulate(size, size, relief), size, size, Wrap::repeat, Reconstruction::quadratic_bspline);
+  Rng rng(3);
+  double error = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec2 st(rng.uniform(-1.0, 2.0), rng.uniform(-1.0, 2.0));
+    const HeightCurvature curvature = map.curvature(st);
+    const double height = relief(st.x(), st.y());
+    const double mixed = 8.0 * pi * pi * std::sin(4.0 * pi * st.x()) * std::sin(2.0 * pi * st.y());
+    error = std::max({error, std::abs(curvature.ss + 16.0 * pi * pi * height),
+                      std::abs(curvature.tt + 4.0 * pi * pi * height), std::abs(curvature.st - mixed)});
+  }
+  return error;
+}
+
+TEST(HeightMapCosine, BsplineConvergesWithFirstOrderSecondDerivatives) {
+  const double fine = cosine_curvature_error(128);
+  EXPECT_NEAR(cosine_curvature_error(64) / fine, 2.0, 0.2);
+  // Half a texel of the third derivative.
+  EXPECT_NEAR(fine, std::pow(4.0 * pi, 3) * 0.5 / 128, 0.1 * fine);
 }
 
 TEST(HeightMapStep, BsplineOvershootsByTenPercentAndTheBoundsSaySo) {  // formulation amendment 11
@@ -249,6 +275,88 @@ RC_GTEST_PROP(HeightMapGradient, AgreesWithFiniteDifferences, ()) {
 TEST(HeightMapGradient, IsZeroForNearest) {
   const HeightMap map = map_of(random_heights(8, 8, 9), 8, 8, Wrap::repeat, Reconstruction::nearest);
   EXPECT_EQ(map.sample({0.3, 0.7}).gradient, Vec2::Zero());
+}
+
+RC_GTEST_PROP(HeightMapCurvature, HasTheHeightAndGradientOfSampleToTheBit, ()) {
+  const int width = *rc::gen::inRange(1, 20);
+  const int height = *rc::gen::inRange(1, 20);
+  const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
+  const Reconstruction reconstruction =
+      *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  const auto coordinate = [&] {
+    const double special[] = {0.0,
+                              1.0,
+                              -1e-18,
+                              -0.25,
+                              1e-300,
+                              0x1p31,
+                              -0x1p40,
+                              1e300,
+                              infinity,
+                              -infinity,
+                              std::numeric_limits<double>::quiet_NaN()};
+    return rng.below(4) == 0 ? special[rng.below(std::size(special))] : rng.uniform(-3.0, 3.0);
+  };
+  for (int i = 0; i < 50; ++i) {
+    const Vec2 st(coordinate(), coordinate());
+    const HeightSample sample = map.sample(st);
+    const HeightCurvature curvature = map.curvature(st);
+    RC_ASSERT(curvature.height == sample.height);
+    RC_ASSERT(curvature.gradient == sample.gradient);
+    RC_ASSERT(std::isfinite(curvature.ss) && std::isfinite(curvature.st) && std::isfinite(curvature.tt));
+  }
+}
+
+RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) {
+  const int width = *rc::gen::inRange(1, 20);
+  const int height = *rc::gen::inRange(1, 20);
+  const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
+  const Reconstruction reconstruction =
+      *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  // Pieces of the spline meet on the texels' borders, those of the other two at least on the lines through centres.
+  const double piece = reconstruction == Reconstruction::quadratic_bspline ? 0.0 : 0.5;
+  const Vec2 step(0.05 / width, 0.05 / height);
+  for (int i = 0; i < 20; ++i) {
+    const auto inside_a_piece = [&](int count) {
+      const double half = piece > 0.0 ? 0.25 * static_cast<double>(rng.below(2)) : 0.0;  // nearest: not on a border
+      const double texel = std::floor(rng.uniform(-2.0 * count, 3.0 * count));
+      return (texel + piece + (piece > 0.0 ? rng.uniform(0.06, 0.19) + half * 2.0 : rng.uniform(0.06, 0.94))) / count;
+    };
+    const Vec2 st(inside_a_piece(width), inside_a_piece(height));
+    const Vec2 along_s =
+        (map.sample(st + Vec2(step.x(), 0.0)).gradient - map.sample(st - Vec2(step.x(), 0.0)).gradient) /
+        (2.0 * step.x());
+    const Vec2 along_t =
+        (map.sample(st + Vec2(0.0, step.y())).gradient - map.sample(st - Vec2(0.0, step.y())).gradient) /
+        (2.0 * step.y());
+    const HeightCurvature curvature = map.curvature(st);
+    // Within a piece the gradient is at most quadratic along an axis, so the quotient is exact but for rounding.
+    RC_ASSERT(std::abs(curvature.ss - along_s.x()) <= 1e-9 * 1e-3 * width * width);
+    RC_ASSERT(std::abs(curvature.st - along_s.y()) <= 1e-9 * 1e-3 * width * height);
+    RC_ASSERT(std::abs(curvature.st - along_t.x()) <= 1e-9 * 1e-3 * width * height);
+    RC_ASSERT(std::abs(curvature.tt - along_t.y()) <= 1e-9 * 1e-3 * height * height);
+  }
+}
+
+TEST(HeightMapCurvature, IsZeroAlongAClampedAxisOutside) {
+  const HeightMap map = map_of(random_heights(9, 14, 12), 9, 14, Wrap::clamp, Reconstruction::quadratic_bspline);
+  const HeightCurvature border = map.curvature({0.0, 0.4});
+  EXPECT_NE(border.ss, 0.0);
+  EXPECT_NE(border.tt, 0.0);
+  const HeightCurvature outside = map.curvature({-1e-9, 0.4});
+  EXPECT_EQ(outside.ss, 0.0);
+  EXPECT_EQ(outside.st, 0.0);
+  EXPECT_EQ(outside.tt, border.tt);
+  const HeightCurvature above = map.curvature({0.4, 1.0 + 1e-9});
+  EXPECT_EQ(above.ss, map.curvature({0.4, 1.0}).ss);
+  EXPECT_EQ(above.st, 0.0);
+  EXPECT_EQ(above.tt, 0.0);
+  // A coordinate that is not finite reads as 0, which is not outside.
+  EXPECT_EQ(map.curvature({infinity, 0.4}).ss, border.ss);
 }
 
 TEST(HeightMapWrap, RepeatIsEqualAfterWholeShiftsOfAnySize) {

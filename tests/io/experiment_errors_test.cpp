@@ -122,9 +122,11 @@ TEST_F(ExperimentErrors, Surfaces) {
   surface(R"("law":"mesostructure")", ErrorCode::unsupported_pair, "surfaces[0].law", "needs a coat");
   surface(R"("law":{"type":"god-object","rho":0.1})", ErrorCode::bad_key, "surfaces[0].law.rho",
           "is not read by the law");
-  surface(R"("law":{"rho":0.5})", ErrorCode::bad_value, "surfaces[0].law.rho", "0.3333");
-  surface(R"("law":{"blend":"cubic"})", ErrorCode::bad_value, "surfaces[0].law.blend", "s_shape");
-  surface(R"("law":{"blend":[0.5]})", ErrorCode::bad_value, "surfaces[0].law.blend_map", "two");
+  surface(R"("law":{"type":"mesostructure-literal","rho":0.5})", ErrorCode::bad_value, "surfaces[0].law.rho", "0.3333");
+  surface(R"("law":{"type":"mesostructure-literal","blend":"cubic"})", ErrorCode::bad_value, "surfaces[0].law.blend",
+          "s_shape");
+  surface(R"("law":{"type":"mesostructure-literal","blend":[0.5]})", ErrorCode::bad_value, "surfaces[0].law.blend_map",
+          "two");
 }
 
 TEST_F(ExperimentErrors, Meshes) {
@@ -174,9 +176,86 @@ TEST_F(ExperimentErrors, Coats) {
   EXPECT_FALSE(parse(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"broken.png"}}]})").ok());
 }
 
+TEST_F(ExperimentErrors, Heights) {
+  const std::string accepted = "a length of 0 or more (m, cm, mm, um, nm, in), or a share of the mean edge (\"10 %\")";
+  coat(R"("height_map":"map.png","height":-1)", ErrorCode::bad_value, ".height", accepted);
+  coat(R"("height_map":"map.png","height":"-3 %")", ErrorCode::bad_value, ".height", accepted);
+  coat(R"("height_map":"map.png","height":"3 N")", ErrorCode::bad_value, ".height", accepted);
+  coat(R"("height_map":"map.png","height":[1])", ErrorCode::bad_type, ".height", accepted);
+  coat(R"("height_map":"map.png","height":"1mm","offset":"x %")", ErrorCode::bad_value, ".offset", "or a share");
+  coat(R"("height_map":"map.png","height_range":[0,"3 Hz"])", ErrorCode::bad_value, ".height_range[1]", "or a share");
+}
+
+TEST_F(ExperimentErrors, Generators) {
+  const auto map = [&](const std::string& keys, ErrorCode code, const std::string& place, const std::string& part) {
+    coat(R"("height_map":{)" + keys + R"(},"height":"0.1mm")", code, ".height_map." + place, part);
+  };
+  // Every key that a generator does not take.
+  const std::vector<std::pair<std::string, std::string>> taken{
+      {"H_0", ""},
+      {"H_1", "count wall"},
+      {"H_2", "count width"},
+      {"H_3", "number"},
+      {"H_4", "number radius seed"},
+      {"H_5", "number radius rim field flank overlap seed"},
+      {"H_6", "width flank radius"},
+      {"H_7", "hurst octaves seed"},
+  };
+  for (const auto& [generator, keys] : taken) {
+    for (const char* key : {"count", "number", "wall", "width", "flank", "radius", "rim", "field", "overlap", "hurst",
+                            "octaves", "seed"}) {
+      if (keys.find(key) != std::string::npos) continue;
+      map(R"("generator":")" + generator + R"(",")" + key + R"(":1)", ErrorCode::bad_key, key, "is not read by");
+    }
+  }
+  map(R"("generator":"H_3","seed":2)", ErrorCode::bad_key, "seed", "number");
+  map(R"("generator":"H_1","count":300)", ErrorCode::bad_value, "count", "1 to 256");
+  map(R"("generator":"H_1","wall":0.7)", ErrorCode::bad_value, "wall", "0 to 0.5");
+  map(R"("generator":"H_1","wall":"3mm")", ErrorCode::bad_value, "wall", "unknown unit");
+  map(R"("generator":"H_2","width":0.001)", ErrorCode::bad_value, "width", "0.01562 to 0.9844");
+  map(R"("generator":"H_4","number":1.5)", ErrorCode::bad_value, "number", "whole number");
+  map(R"("generator":"H_4","number":1000)", ErrorCode::bad_value, "number", "find a place");
+  map(R"("generator":"H_4","radius":[0.1])", ErrorCode::bad_value, "radius", "two [smallest, largest]");
+  map(R"("generator":"H_4","radius":[0.1,0.05])", ErrorCode::bad_value, "radius", "0.1 to 0.25");
+  map(R"("generator":"H_5","number":300)", ErrorCode::bad_value, "number", "1 to 200");
+  map(R"("generator":"H_5","flank":0.01)", ErrorCode::bad_value, "flank", "0 to 0.0054");
+  map(R"("generator":"H_6","radius":[0.1,0.1])", ErrorCode::bad_type, "radius", "0.001 to 0.25");
+  map(R"("generator":"H_6","radius":0.25)", ErrorCode::bad_value, "radius", "0.05 to 0.22");
+  map(R"("generator":"H_7","hurst":2)", ErrorCode::bad_value, "hurst", "0.05 to 1");
+  map(R"("generator":"H_7","octaves":9)", ErrorCode::bad_value, "octaves", "1 to 8");
+  coat(R"("height_map":"map.png","normals":"image")", ErrorCode::bad_value, ".normals", "\"map\"");
+  coat(R"("height_map":"map.png","normals":"map","normal_map":"normal.png")", ErrorCode::bad_key, ".normals",
+       "beside normal_map");
+}
+
+TEST_F(ExperimentErrors, TrialMeshes) {
+  const auto mesh = [&](const std::string& keys, ErrorCode code, const std::string& place, const std::string& part) {
+    expect(R"({"surfaces":[{"mesh":{)" + keys + "}}]}", code, "surfaces[0].mesh" + place, part);
+  };
+  mesh(R"("generator":"M_a","fold_angles":[1])", ErrorCode::bad_key, ".fold_angles", "by this generator");
+  mesh(R"("generator":"M_c","fold_angles":1)", ErrorCode::bad_type, ".fold_angles", "10 to 180 degrees");
+  mesh(R"("generator":"M_c","fold_angles":[])", ErrorCode::bad_value, ".fold_angles", "has 0 angles");
+  mesh(R"("generator":"M_c","fold_angles":[1,"5 deg"])", ErrorCode::bad_value, ".fold_angles[1]", "rad, deg");
+  mesh(R"("generator":"M_e","grading":0.5)", ErrorCode::bad_key, ".grading", "by this generator");
+  mesh(R"("generator":"M_f","grading":1)", ErrorCode::bad_value, ".grading", "0.1 to 0.9");
+  mesh(R"("generator":"M_f","grading":0.1,"triangles":13)", ErrorCode::bad_value, ".triangles", "1 to 12");
+  mesh(R"("generator":"M_b","mesostructure":{})", ErrorCode::bad_key, ".mesostructure", "by this generator");
+  mesh(R"("generator":"M_G")", ErrorCode::bad_value, ".mesostructure", "is missing");
+  mesh(R"("generator":"M_G","mesostructure":3)", ErrorCode::bad_type, ".mesostructure", "is a number");
+  mesh(R"("generator":"M_G","mesostructure":{"height_map":{"generator":"H_9"}})", ErrorCode::bad_value,
+       ".mesostructure.height_map.generator", "fractal (H_7)");
+  mesh(R"("generator":"M_G","subdivisions":8,"mesostructure":{"height_map":{"generator":"H_3"}})", ErrorCode::too_large,
+       ".subdivisions", "4194304");
+  for (const char* key : {"normals", "normal_map", "green"}) {
+    mesh(std::string(R"("generator":"M_G","mesostructure":{"height_map":{"generator":"H_3"},")") + key + R"(":"map"})",
+         ErrorCode::bad_key, std::string(".mesostructure.") + key, "follows the heights");
+  }
+}
+
 TEST_F(ExperimentErrors, ProbesWithRadiusNeedALawThatTakesThem) {
-  expect(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png"}}],"probe":{"radius":"1mm"}})",
-         ErrorCode::unsupported_pair, "surfaces[0].law", "touches with a point");
+  expect(
+      R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png"},"law":"height-field"}],"probe":{"radius":"1mm"}})",
+      ErrorCode::unsupported_pair, "surfaces[0].law", "touches with a point");
 }
 
 TEST_F(ExperimentErrors, Strokes) {

@@ -1,6 +1,7 @@
 // Scene files: defaults, what each key does, built-in scenes, the canonical copy.
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "tests/io/experiment_fixture.h"
 
@@ -17,7 +18,7 @@ TEST_F(ExperimentScene, AMeshAloneIsAScene) {
   EXPECT_EQ(e.name, "scene");
   EXPECT_EQ(e.scene.instances()[0].name, "sphere");
   EXPECT_EQ(e.device.name, "phantom-desktop");
-  EXPECT_EQ(law_name(e.scene.instances()[0].law), "god-object");
+  EXPECT_EQ(law_name(e.scene.instances()[0].law), "proxy");
   EXPECT_EQ(e.scene.instances()[0].sides, Sides::front);
   EXPECT_EQ(e.scene.instances()[0].material.stiffness, 1000.0);
   // 6 units across become the workspace radius of 0.1 m, around the origin, and a note says so.
@@ -71,7 +72,7 @@ TEST_F(ExperimentScene, ACoatChoosesItsMappingAndLaw) {
   const Experiment bare =
       good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","height":"1mm"}}]})");
   EXPECT_EQ(coat_of(bare).settings().mapping, Mapping::triplanar);
-  EXPECT_EQ(law_name(bare.scene.instances()[0].law), "height-field");
+  EXPECT_EQ(law_name(bare.scene.instances()[0].law), "proxy");
   EXPECT_NEAR(coat_of(bare).maps().tile().x(), 0.025, 1e-12);   // a quarter of the object
   EXPECT_NEAR(coat_of(bare).maps().tile().y(), 0.0125, 1e-12);  // square pixels of a 16 x 8 map
   EXPECT_TRUE(has_note(bare, "triplanar"));
@@ -197,7 +198,7 @@ TEST_F(ExperimentScene, LawsTakeNamesOrObjects) {
   EXPECT_EQ(std::get<MesostructureLaw>(meso).rho, 0.1);
   EXPECT_EQ(std::get<MesostructureLaw>(meso).blend, Blend::linear);
   EXPECT_EQ(std::get<HeightFieldLaw>(law(R"({"type":"height-field","edge_taper":0.2})")).edge_taper, 0.2);
-  const Law image = law(R"({"blend":{"image":"map.png"}})");
+  const Law image = law(R"({"type":"mesostructure-literal","blend":{"image":"map.png"}})");
   EXPECT_EQ(std::get<MesostructureLaw>(image).blend, Blend::image);
   ASSERT_EQ(std::get<MesostructureLaw>(image).blend_map.size(), 16u);
   EXPECT_EQ(std::get<MesostructureLaw>(image).blend_map.front(), 0.0);
@@ -257,7 +258,7 @@ TEST_F(ExperimentScene, TheCanonicalCopyIsTheSameExperiment) {
           "coat":{"height_map":"map.png","height":"7%","white_is":"deep","magnify":1.5,"tile":["9mm","7mm"]},"law":"height-field"}],
           "stroke":{"type":"spiral","turns":3}})",
       R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png","height":"1mm","repeat":[2,3],"normal_map":"normal.png","green":"down"},
-          "law":{"blend":{"image":"map.png"},"rho":0.2}}],"stroke":{"type":"raster","rows":3,"normal_force":1}})",
+          "law":{"type":"mesostructure-literal","blend":{"image":"map.png"},"rho":0.2}}],"stroke":{"type":"raster","rows":3,"normal_force":1}})",
   };
   for (const BuiltinScene& scene : builtin_scenes()) scenes.push_back(*builtin_scene_json(scene.name));
   for (const std::string& scene : scenes) {
@@ -280,6 +281,172 @@ TEST_F(ExperimentScene, TheSameSceneInMillimetresFeelsTheSame) {
   const std::uint64_t small = short_run(good(R"({"surfaces":[{"mesh":"small.ply"}]})"), 3000);
   const std::uint64_t large = short_run(good(R"({"surfaces":[{"mesh":"large.ply"}]})"), 3000);
   EXPECT_EQ(small, large);
+}
+
+// ---- the papers' generators
+
+TEST_F(ExperimentScene, EveryMesostructureIsASceneKeyAway) {
+  const auto coat = [&](const std::string& map) {
+    return good(R"({"surfaces":[{"mesh":"sheet.obj","coat":{"filter":"nearest","height":"1mm","height_map":)" + map +
+                "}}]}");
+  };
+  const auto expect_range = [&](const std::string& map, double low, double high) {
+    const Experiment e = coat(map);
+    EXPECT_NEAR(coat_of(e).lowest(), low, 2e-5) << map;
+    EXPECT_NEAR(coat_of(e).highest(), high, 2e-5) << map;
+    // What was decided is in the canonical copy, and reads back as the same relief.
+    const Experiment again = good(e.canonical_json);
+    EXPECT_EQ(again.canonical_json, e.canonical_json);
+    for (int i = 0; i < 200; ++i) {
+      const Vec2 st(0.317 * i, 0.173 * i);
+      ASSERT_EQ(coat_of(again).maps().heights().height_at(st), coat_of(e).maps().heights().height_at(st)) << map;
+    }
+  };
+  expect_range(R"({"generator":"H_1","size":500,"count":5,"wall":"20%"})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_2","size":100,"count":5,"width":0.5})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_3","size":400,"number":6,"seed":4})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_3","size":400})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_4","size":400,"number":6,"seed":4,"radius":[0.02,0.1]})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_4","size":400})", 0.0, 1e-3);
+  expect_range(R"({"generator":"H_5","size":400})", 0.0, 1e-3);
+  expect_range(R"({"generator":"coins","size":400,"number":3,"seed":8,"radius":"20%","rim":0.2,"field":0.3,"flank":"1%",
+                   "overlap":0.5})",
+               0.0, 1e-3);
+  expect_range(R"({"generator":"H_6","size":400,"width":0.1,"flank":0.02,"radius":0.18})", -1e-3, 0.0);
+  expect_range(R"({"generator":"H_6","size":400,"width":"2%"})", -1e-3, 0.0);
+  expect_range(R"({"generator":"H_7","size":400,"hurst":0.5,"octaves":4,"seed":3})", 0.0, 1e-3);
+}
+
+TEST_F(ExperimentScene, MesostructureKeysReachTheFormula) {
+  // Each key, one at a time, gives another map than its absence.
+  const auto texels = [&](const std::string& map) {
+    const Experiment e = good(
+        R"({"surfaces":[{"mesh":"sheet.obj","coat":{"filter":"nearest","height":"1mm","height_map":)" + map + "}}]}");
+    std::vector<double> heights;
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) {
+        heights.push_back(coat_of(e).maps().heights().height_at(Vec2((x + 0.5) / 96.0, (y + 0.5) / 96.0)));
+      }
+    }
+    return heights;
+  };
+  const std::vector<std::pair<std::string, std::vector<std::string>>> keys{
+      {"H_1", {R"("count":3)", R"("wall":0.3)"}},
+      {"H_2", {R"("count":3)", R"("width":0.6)"}},
+      {"H_3", {R"("number":4)", R"("number":4,"seed":2)"}},
+      {"H_4", {R"("number":4)", R"("seed":2)", R"("radius":0.1)", R"("radius":[0.02,0.1])"}},
+      {"H_5",
+       {R"("number":4)", R"("seed":2)", R"("radius":0.1)", R"("rim":0.3)", R"("field":0.3)", R"("flank":0.005)"}},
+      {"H_6", {R"("width":0.05)", R"("flank":0)", R"("radius":0.1)"}},
+      {"H_7", {R"("hurst":0.5)", R"("octaves":2)", R"("seed":2)"}},
+  };
+  for (const auto& [generator, changes] : keys) {
+    const std::string start = R"({"generator":")" + generator + R"(","size":96)";
+    std::set<std::vector<double>> different{texels(start + "}")};
+    for (const std::string& change : changes) different.insert(texels(start + "," + change + "}"));
+    EXPECT_EQ(different.size(), changes.size() + 1) << generator;
+  }
+}
+
+TEST_F(ExperimentScene, SharesOfTheMeanEdgeBecomeMetres) {
+  // The papers' amplitudes; M_f has edges of many lengths, of which the mean counts.
+  for (const char* mesh : {R"({"generator":"M_a","mean_edge":"10mm"})", R"({"generator":"M_f","mean_edge":"10mm"})"}) {
+    for (const int percent : {1, 5, 10, 15, 20}) {
+      for (const char* space : {"", " "}) {
+        const Experiment e = good(std::string(R"({"surfaces":[{"mesh":)") + mesh +
+                                  R"(,"coat":{"filter":"nearest","height_map":{"generator":"H_2"},"height":")" +
+                                  std::to_string(percent) + space + R"(%"}}]})");
+        EXPECT_NEAR(coat_of(e).highest(), percent * 1e-4, 1e-9);
+        const Json coat = Json::parse(e.canonical_json)["surfaces"][0]["coat"];
+        ASSERT_TRUE(coat["height"].is_number());
+        EXPECT_NEAR(coat["height"].get<double>(), percent * 1e-4, 1e-12);
+      }
+    }
+  }
+  const auto flat = [&](const std::string& keys) {
+    return coat_of(good(R"({"surfaces":[{"mesh":{"generator":"M_a"},"coat":{"height_map":{"generator":"H_0"},)" + keys +
+                        "}}]}"))
+        .highest();
+  };
+  EXPECT_NEAR(flat(R"("height":"-5%")"), -0.5e-3, 1e-9);
+  EXPECT_EQ(flat(R"("height":"0%")"), 0.0);
+  EXPECT_NEAR(flat(R"("height":"1mm","offset":"-5 %")"), 0.5e-3, 1e-9);
+  const Experiment range = good(
+      R"({"surfaces":[{"mesh":{"generator":"M_a"},"coat":{"filter":"nearest","height_map":"map.png","height_range":["-10%","0.2mm"]}}]})");
+  EXPECT_NEAR(coat_of(range).lowest(), -1e-3, 1e-9);
+  EXPECT_NEAR(coat_of(range).highest(), 0.2e-3, 1e-9);
+}
+
+TEST_F(ExperimentScene, NormalsMayBeMadeIntoAMap) {
+  const auto scene = [&](const std::string& normals) {
+    return good(
+        R"({"surfaces":[{"mesh":{"generator":"M_a"},"coat":{"height_map":{"generator":"H_3","size":128},"height":"1mm")" +
+        normals + R"(},"law":"force-shading"}]})");
+  };
+  EXPECT_FALSE(coat_of(scene("")).maps().has_normal_map());
+  EXPECT_FALSE(coat_of(scene(R"(,"normals":"heights")")).maps().has_normal_map());
+  const Experiment mapped = scene(R"(,"normals":"map")");
+  const NormalMap* normals = coat_of(mapped).maps().normals();
+  ASSERT_NE(normals, nullptr);
+  EXPECT_EQ(normals->width(), 128);
+  EXPECT_TRUE(coat_of(good(mapped.canonical_json)).maps().has_normal_map());
+  // It is the normal of the heights: nearly that of the reconstruction at the texel centres of a gentle relief.
+  const Experiment plain = scene("");
+  for (int i = 0; i < 128; ++i) {
+    const Vec2 st((i + 0.5) / 128.0, (0.7 * 128.0 + 0.1) / 128.0);
+    EXPECT_LT((coat_of(mapped).maps().sample(st).normal - coat_of(plain).maps().sample(st).normal).norm(), 0.02);
+  }
+  EXPECT_NE(short_run(mapped, 1500), short_run(plain, 1500));
+}
+
+TEST_F(ExperimentScene, TrialMeshesTakeAllTheirParameters) {
+  const auto mesh = [&](const std::string& keys) {
+    const Experiment e = good(R"({"surfaces":[{"mesh":{)" + keys + "}}]}");
+    EXPECT_EQ(good(e.canonical_json).canonical_json, e.canonical_json);
+    return base_mesh(e.scene.instances()[0].surface).report();
+  };
+  EXPECT_EQ(mesh(R"("generator":"M_d","subdivisions":2)").triangles, 320u);
+  EXPECT_NEAR(mesh(R"("generator":"M_d","subdivisions":2,"mean_edge":"7mm")").mean_edge, 0.007, 1e-9);
+  // Flat angles leave M_a's area under a smaller height.
+  const double rows = 6.0 * 0.01 * std::sqrt(3.0) / 2.0;
+  EXPECT_EQ(mesh(R"("generator":"M_c","columns":3,"rows":6)").triangles, 36u);
+  const Experiment folded = good(R"({"surfaces":[{"mesh":{"generator":"M_c","rows":6,"fold_angles":["120 deg"]}}]})");
+  const Box& bounds = base_mesh(folded.scene.instances()[0].surface).bounds();
+  EXPECT_NEAR(bounds.extent().z(), rows * std::cos(std::acos(-1.0) / 6.0), 1e-12);
+  EXPECT_NEAR(bounds.extent().y(), rows / 6.0 * 0.5, 1e-12);
+  const MeshReport graded = mesh(R"("generator":"M_f","triangles":5,"grading":0.8)");
+  EXPECT_EQ(graded.triangles, 5u);
+  EXPECT_LT(graded.max_edge / graded.min_edge, 5.0);
+}
+
+TEST_F(ExperimentScene, MGFollowsWhatACoatWouldWear) {
+  const std::string relief = R"({"height_map":{"generator":"H_3","size":64},"height":"10 %","mapping":"uv"})";
+  const std::string sheet = R"("columns":4,"rows":4,"mean_edge":"10mm")";
+  const Experiment coated =
+      good(R"({"surfaces":[{"mesh":{"generator":"M_b",)" + sheet + R"(},"coat":)" + relief + "}]}");
+  const Experiment dense = good(R"({"surfaces":[{"mesh":{"generator":"M_G",)" + sheet +
+                                R"(,"subdivisions":3,"mesostructure":)" + relief + "}}]}");
+  const TriangleMesh& base = base_mesh(coated.scene.instances()[0].surface);
+  const TriangleMesh& geometry = base_mesh(dense.scene.instances()[0].surface);
+  EXPECT_EQ(geometry.report().triangles, base.report().triangles * 64);
+  EXPECT_EQ(geometry.report().components, 1u);
+  // Every base vertex has moved by the coat's height, along its normal.
+  for (std::uint32_t face = 0; face < base.triangles().size(); ++face) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = base.triangles()[face][k];
+      const double height = coat_of(coated).sample(base, face, Vec3::Unit(static_cast<int>(k))).height;
+      const Vec3 expected = base.positions()[vertex] + height * base.vertex_normal(vertex);
+      double nearest = infinity;
+      for (const Vec3& p : geometry.positions()) nearest = std::min(nearest, (p - expected).norm());
+      ASSERT_LT(nearest, 1e-9);
+    }
+  }
+  // The canonical copy holds metres, of M_b's edge, and makes the same geometry.
+  const Json mesh = Json::parse(dense.canonical_json)["surfaces"][0]["mesh"];
+  EXPECT_NEAR(mesh["mesostructure"]["height"].get<double>(), 1e-3, 1e-12);
+  const Experiment again = good(dense.canonical_json);
+  EXPECT_EQ(again.canonical_json, dense.canonical_json);
+  EXPECT_EQ(short_run(again, 1500), short_run(dense, 1500));
 }
 
 TEST_F(ExperimentScene, RealMapsAndMeshes) {

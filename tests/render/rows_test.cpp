@@ -10,7 +10,7 @@ namespace {
 using namespace test;
 
 constexpr double newton_tolerance = 1e-9;
-const char* const coated_laws[] = {"force-shading", "height-field", "mesostructure"};
+const char* const coated_laws[] = {"proxy", "force-shading", "height-field", "mesostructure"};
 
 /// A long path over a flat mesh, pressed in all the time: straight lines through the interior and along a line of
 /// vertices.
@@ -102,8 +102,8 @@ void expect_same_away_from_folds(const MeshSource& source, double depth) {
   const TriangleMesh mesh = mesh_of(source);
   const Scene plain = scene_of(bare(source), GodObjectLaw{});
   std::vector<std::pair<std::string, Scene>> scenes;
-  for (const char* law : coated_laws)
-    scenes.emplace_back(law, scene_of(coated(source, flat_map(0.0), Mapping::uv), named(law)));
+  const auto surface = coated(source, flat_map(0.0), Mapping::uv);
+  for (const char* law : coated_laws) scenes.emplace_back(law, scene_of(surface, named(law)));
   Rng rng(3);
   int checked = 0;
   for (int i = 0; i < 50000 && checked < 300; ++i) {
@@ -123,9 +123,17 @@ void expect_same_away_from_folds(const MeshSource& source, double depth) {
     const Vec3 inside = foot - rng.uniform(0.1, 1.0) * depth * frame.normal;
     const Vec3 expected = poke(plain, outside, inside).wrench.force;
     ASSERT_GT(expected.norm(), 0.0);
+    // Shell heights are metric over a face as far as its corners' directions are (amendment 2): on the zero set the
+    // laws agree exactly, in depth to that.
+    double slant = 0.0;
+    for (const std::uint32_t vertex : mesh.triangles()[face])
+      slant = std::max(slant, std::abs(1.0 - frame.normal.dot(surface->shell().directions[vertex].cast<double>())));
     for (const auto& [law, scene] : scenes) {
-      ASSERT_LE((poke(scene, outside, inside).wrench.force - expected).norm(), newton_tolerance)
+      const bool in_depth = law == "height-field" || law == "mesostructure";
+      ASSERT_LE((poke(scene, outside, inside).wrench.force - expected).norm(),
+                4.0 * newton_tolerance + (in_depth ? 4.0 * slant * expected.norm() : 0.0))
           << law << " on face " << face;
+      ASSERT_EQ(poke(scene, outside, foot + 1e-7 * depth * frame.normal).wrench.force, Vec3::Zero().eval()) << law;
     }
   }
   EXPECT_EQ(checked, 300);
@@ -214,7 +222,7 @@ Trace scan(const Relief& relief, const Law& law, bool leave_out_steps) {
 TEST(H_II, force_shading_has_no_height_over_H_2_and_H_3) {
   for (const MesostructureKind kind : {MesostructureKind::beams, MesostructureKind::rings}) {
     const Relief relief(kind);
-    const Trace trace = scan(relief, ForceShadingLaw{}, kind == MesostructureKind::beams);
+    const Trace trace = scan(relief, ForceShadingLaw{Formulation::literal}, kind == MesostructureKind::beams);
     EXPECT_GT(trace.samples, 600);
     EXPECT_LT(trace.excursion, 0.05 * relief.amplitude) << paper_name(kind);
   }
@@ -249,7 +257,13 @@ void expect_followed_on_sphere(MesostructureKind kind, int subdivisions, Mapping
   const HeightMap map = must(generate_height_map({kind, 256, amplitude, 3, 1}, Wrap::repeat, Reconstruction::bilinear));
   const auto surface = coated(icosphere(subdivisions, radius), map, mapping, 0.02);
   const TriangleMesh& mesh = surface->base().mesh();
-  for (const char* law : {"height-field", "mesostructure"}) {
+  // Over the walls of H_2 a potential pushes sideways, and on a coarse base its rays lean: there the proxy alone is
+  // exact.
+  // Off the flanks of warts a point slips sideways, so there the potentials are asked.
+  std::vector<const char*> laws;
+  if (kind != MesostructureKind::warts) laws.push_back("proxy");
+  if (kind != MesostructureKind::beams) laws.insert(laws.end(), {"height-field", "mesostructure"});
+  for (const char* law : laws) {
     const Scene scene = scene_of(surface, named(law));
     Rng rng(5);
     double squares = 0.0;
@@ -263,7 +277,13 @@ void expect_followed_on_sphere(MesostructureKind kind, int subdivisions, Mapping
         const Vec3 barycentric = (1.0 - t) * Vec3(0.7, 0.15, 0.15) + t * Vec3(0.15, 0.35, 0.5);
         const Vec3 base = point_on(mesh, face, barycentric);
         const double z = height_at_force(scene, state, base, normal, force, 2e-3, -1e-3) + force / stiffness;
-        squares += std::pow(z - surface->coat().sample(mesh, face, barycentric).height, 2);
+        // Rays of the shell lean over a coarse base: the relief is where a probe that comes straight down meets it.
+        Hint hint;
+        const SweptHit met = surface->segment({base + 3e-3 * normal, base - 3e-3 * normal}, 0.0, Sides::front, hint);
+        ASSERT_TRUE(met.hit);
+        // Next to a wall the height under the probe depends on where exactly it stands (amendment 16).
+        if (met.contact.normal.dot(normal) < 0.8) continue;
+        squares += std::pow(z - (3e-3 - 6e-3 * met.t), 2);
         ++samples;
       }
     }
@@ -311,9 +331,10 @@ struct Jumps {
   double force = 0.0;
   double normal_force = 0.0;
 };
-Jumps jumps_over_edges(const Law& law, double step) {
-  static const auto surface = coated(trial_mesh_a(), wavy_map(5e-4), Mapping::per_face);
-  const Scene scene = scene_of(surface, law);
+Jumps jumps_over_edges(Blend blend, double step) {
+  const auto surface =
+      coated(trial_mesh_a(), wavy_map(5e-4), Mapping::per_face, 0.01, 1.0, Stitching{FoldMode::keep, blend, 0.05, {}});
+  const Scene scene = scene_of(surface, MesostructureLaw{});
   const Vec3 from(-0.0093, -0.0061, -1e-3);
   const Vec3 to(0.0112, 0.0087, -1e-3);
   const auto path = line(from, to, static_cast<int>(std::lround((to - from).norm() / step)));
@@ -325,14 +346,14 @@ Jumps jumps_over_edges(const Law& law, double step) {
 }
 
 TEST(H_edge, without_a_blend_the_jump_at_edges_persists) {
-  const MesostructureLaw law{Formulation::consistent, 0.05, Blend::none, {}};
+  const Blend law = Blend::none;
   const double coarse = jumps_over_edges(law, 1e-6).normal_force;
   EXPECT_GT(coarse, 0.02);
   EXPECT_GT(jumps_over_edges(law, 0.5e-6).normal_force, 0.95 * coarse);
 }
 
 TEST(H_edge, with_the_s_shape_halving_the_step_halves_the_change_of_force) {
-  const MesostructureLaw law{Formulation::consistent, 0.05, Blend::s_shape, {}};
+  const Blend law = Blend::s_shape;
   const double ratio = jumps_over_edges(law, 2e-6).force / jumps_over_edges(law, 1e-6).force;
   EXPECT_GT(ratio, 1.6);
   EXPECT_LT(ratio, 2.4);
@@ -341,7 +362,7 @@ TEST(H_edge, with_the_s_shape_halving_the_step_halves_the_change_of_force) {
 TEST(H_edge, with_the_linear_blend_halving_the_step_halves_the_change_of_height) {
   // The weight has kinks at the band's borders, so its gradient, and with it the lateral force of the potential, steps
   // there.
-  const MesostructureLaw law{Formulation::consistent, 0.05, Blend::linear, {}};
+  const Blend law = Blend::linear;
   const double ratio = jumps_over_edges(law, 2e-6).normal_force / jumps_over_edges(law, 1e-6).normal_force;
   EXPECT_GT(ratio, 1.6);
   EXPECT_LT(ratio, 2.4);

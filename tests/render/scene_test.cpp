@@ -69,11 +69,11 @@ TEST(SceneErrors, each_bad_material_value_is_named) {
 TEST(SceneErrors, each_bad_law_option_is_named) {
   expect_named(refused(good(HeightFieldLaw{Formulation::literal, 0.5})), ErrorCode::bad_value,
                "surfaces[1].law.edge_taper");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.0, Blend::linear, {}})), ErrorCode::bad_value,
+  expect_named(refused(good(MesostructureLaw{Formulation::literal, 0.0, Blend::linear, {}})), ErrorCode::bad_value,
                "surfaces[1].law.rho");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {}})), ErrorCode::bad_value,
+  expect_named(refused(good(MesostructureLaw{Formulation::literal, 0.05, Blend::image, {}})), ErrorCode::bad_value,
                "surfaces[1].law.blend_map");
-  expect_named(refused(good(MesostructureLaw{Formulation::consistent, 0.05, Blend::image, {0.0, 2.0}})),
+  expect_named(refused(good(MesostructureLaw{Formulation::literal, 0.05, Blend::image, {0.0, 2.0}})),
                ErrorCode::bad_value, "surfaces[1].law.blend_map");
 }
 

@@ -64,8 +64,9 @@ inline std::shared_ptr<const Mesostructure> tiled(HeightMap map, double tile = 0
   return std::make_shared<const Mesostructure>(must(Mesostructure::build(std::move(map), Vec2(tile, tile))));
 }
 
-inline Coat coat_on(const TriangleMesh& mesh, HeightMap map, Mapping mapping, double tile = 0.01) {
-  return must(Coat::build(mesh, tiled(std::move(map), tile), CoatSettings{mapping, Vec2::Ones()}));
+inline Coat coat_on(const TriangleMesh& mesh, HeightMap map, Mapping mapping, double tile = 0.01,
+                    const Stitching& stitching = {}) {
+  return must(Coat::build(mesh, tiled(std::move(map), tile), CoatSettings{mapping, Vec2::Ones(), stitching}));
 }
 
 inline std::shared_ptr<const MeshSurface> bare(MeshSource source, double scale = 1.0) {
@@ -73,9 +74,10 @@ inline std::shared_ptr<const MeshSurface> bare(MeshSource source, double scale =
 }
 
 inline std::shared_ptr<const ReliefSurface> coated(MeshSource source, HeightMap map, Mapping mapping,
-                                                   double tile = 0.01, double scale = 1.0) {
+                                                   double tile = 0.01, double scale = 1.0,
+                                                   const Stitching& stitching = {}) {
   TriangleMesh mesh = mesh_of(std::move(source), scale);
-  Coat coat = coat_on(mesh, std::move(map), mapping, tile);
+  Coat coat = coat_on(mesh, std::move(map), mapping, tile, stitching);
   return std::make_shared<const ReliefSurface>(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat));
 }
 

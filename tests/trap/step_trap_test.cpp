@@ -153,9 +153,11 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
       const Scene scene = scene_with(law, structure, radius);
       ProxyState state;
       int touching = 0;
+      // A ball on a relief takes milliseconds a tick: fewer of them.
+      const int ticks = radius > 0.0 && law_name(law) == "proxy" ? 200 : 4000;
       // In the air, into contact, sliding, jumping through, not finite, a fresh state: all of it trapped.
       const Counts counts = trapped([&] {
-        for (int i = 0; i < 4000; ++i) {
+        for (int i = 0; i < ticks; ++i) {
           const double s = i * 1e-3;
           const double reach = i % 500 < 20 ? 0.07 : (i % 700 == 30 ? 0.0 : 0.0495 + 0.001 * std::sin(20.0 * s));
           ProbeSample probe;
@@ -166,7 +168,7 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
           touching += step(scene, state, probe, Seconds(1e-3)).flags.has(TickFlag::contact) ? 1 : 0;
         }
       });
-      EXPECT_GT(touching, 500);
+      EXPECT_GT(touching, ticks / 8);
       EXPECT_EQ(counts.allocations, 0);
       EXPECT_EQ(counts.locks, 0);
       EXPECT_EQ(counts.throws, 0);

@@ -1,0 +1,137 @@
+#pragma once
+// Touching single triangles: what a ball that moves or rests among a few of them meets. The same rules as TriangleIndex
+// follows, for triangles that are in no index because they exist for one tick only.
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/geometry/closest_point.h"
+#include "asperity/geometry/contact.h"
+
+namespace asperity {
+
+/// Lengths below which places are one, for a set of triangles.
+struct ContactTolerance {
+  double skin = 0.0;      ///< thickness that separates a resting probe from the surface (m)
+  double rounding = 0.0;  ///< of a coordinate, with room (m)
+
+  /// For triangles of this mean edge (m) that lie within `bounds`. [any]
+  static ContactTolerance of(double mean_edge, const Box& bounds) noexcept {
+    const double size = bounds.diagonal() + bounds.lower.cwiseAbs().cwiseMax(bounds.upper.cwiseAbs()).norm();
+    return {std::max(1e-6 * mean_edge, 1e-9 * bounds.diagonal()), 64.0 * std::numeric_limits<double>::epsilon() * size};
+  }
+};
+
+// In skins: a motion is blocked when it would come nearer than the first, and ends at the second. Between the two a
+// probe slides freely, so that rounding never holds it where it rests. Either counts as reached within the third.
+inline constexpr double blocked_in_skins = 0.5;
+inline constexpr double stopped_in_skins = 0.75;
+inline constexpr double reached_in_skins = 0.0025;
+/// A ball resting within this many skins of a triangle touches it.
+inline constexpr double touch_in_skins = 2.0;
+/// A ball whose motion is shorter than this share of its radius is judged at its end.
+inline constexpr double glide_of_radius = 0.25;
+
+/// The foot of `p` on a triangle: its normal is the face's inside the face, and points to `p` on edges and corners.
+/// [servo]
+inline Foot triangle_foot(std::uint32_t element, const TrianglePoint& at, const Vec3& p, const Vec3& face_normal,
+                          const ContactTolerance& tolerance) noexcept {
+  Foot foot;
+  foot.point = at.point;
+  foot.distance = std::sqrt(at.squared_distance);
+  foot.element = element;
+  foot.barycentric = at.barycentric;
+  const Vec3 offset = p - at.point;
+  foot.normal = offset.dot(face_normal) < 0.0 ? Vec3(-face_normal) : face_normal;
+  if (at.barycentric.minCoeff() > 0.0 || foot.distance <= tolerance.rounding) return foot;
+  // The direction of a short offset is rounding; where it agrees with the face within that rounding, it is the face's.
+  if ((offset - foot.distance * foot.normal).norm() > tolerance.rounding) foot.normal = offset / foot.distance;
+  return foot;
+}
+
+/// Shortens `best` to where a ball that moves along `motion` first touches triangle (a, b, c). Its distance is convex
+/// along the motion, so Newton's method from the start never passes the first touch. [servo]
+inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, const Vec3& c, const Segment& motion,
+                           double radius, Sides sides, const ContactTolerance& tolerance, SweptHit& best) noexcept {
+  constexpr int newton_limit = 32;
+  const Vec3 direction = motion.to - motion.from;
+  const Vec3 cross = (b - a).cross(c - a);
+  if (sides == Sides::front && cross.dot(motion.from - a) < 0.0) return;
+  const double blocked = radius + (blocked_in_skins + reached_in_skins) * tolerance.skin;
+  const double stopped = radius + (stopped_in_skins + reached_in_skins) * tolerance.skin;
+  double t = 0.0;
+  double t_stop = -1.0;
+  TrianglePoint at_stop;
+  for (int i = 0; i < newton_limit; ++i) {
+    const Vec3 x = motion.from + t * direction;
+    const TrianglePoint at = closest_point_on_triangle(x, a, b, c);
+    const double distance = std::sqrt(at.squared_distance);
+    // Exactly on a sheet its side is not decided yet: the motion away from it decides.
+    if (distance == 0.0 && (sides == Sides::both || cross.dot(direction) >= 0.0)) return;
+    const double slope = distance > 0.0 ? (x - at.point).dot(direction) / distance : -1.0;
+    if (slope >= 0.0) return;
+    if (t_stop < 0.0 && distance <= stopped) {
+      t_stop = t;
+      at_stop = at;
+    }
+    if (distance <= blocked) break;
+    const double next = radius + (t_stop < 0.0 ? stopped_in_skins : blocked_in_skins) * tolerance.skin;
+    t += (distance - next) / -slope;
+    if (t >= best.t) return;
+  }
+  best.hit = true;
+  best.t = std::max(t_stop, 0.0);
+  best.contact = triangle_foot(element, at_stop, motion.from + best.t * direction, cross.normalized(), tolerance);
+}
+
+/// Adds the plane of triangle (a, b, c) if it comes within `reach` of `position`; of one plane the nearest triangle
+/// stays. [servo]
+inline void add_triangle_contact(std::uint32_t element, const Vec3& a, const Vec3& b, const Vec3& c,
+                                 const Vec3& position, double reach, Sides sides, const ContactTolerance& tolerance,
+                                 ContactSet& out) noexcept {
+  // Two contacts whose normals differ by less than this angle are one plane: their common line is undefined.
+  constexpr double same_plane_cosine = 1.0 - 1e-10;
+  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
+  if (point.squared_distance > reach * reach) return;
+  const Vec3 cross = (b - a).cross(c - a);
+  if (sides == Sides::front && cross.dot(position - a) < 0.0) return;
+  const Foot contact = triangle_foot(element, point, position, cross.normalized(), tolerance);
+  for (Foot& other : out) {
+    if (contact.normal.dot(other.normal) < same_plane_cosine) continue;
+    if (contact.distance < other.distance) other = contact;
+    return;
+  }
+  out.push_back(contact);
+}
+
+/// Makes of the edges and corners among the contacts what they mean beside a touched face. A ball over a face also
+/// comes near the edges of its neighbours; the face's own plane keeps it off those edges. Taken as planes of their own,
+/// which lean back towards the ball, they would hold it at every edge it wants to slide across. `corners(element)`
+/// answers a triangle's three corners. [servo]
+template <class Corners>
+void settle_edge_contacts(const Vec3& position, const ContactTolerance& tolerance, const Corners& corners,
+                          ContactSet& contacts) noexcept {
+  const auto inside_face = [](const Foot& foot) { return foot.barycentric.minCoeff() > 0.0; };
+  for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
+    Foot& edge = contacts[i];
+    if (inside_face(edge)) continue;
+    const Foot* guard = nullptr;
+    for (const Foot& face : contacts) {
+      if (inside_face(face) && face.normal.dot(edge.point - face.point) <= tolerance.rounding) guard = &face;
+    }
+    if (guard == nullptr) continue;
+    const std::array<Vec3, 3> triangle = corners(edge.element);
+    double highest = -infinity;
+    for (const Vec3& corner : triangle) highest = std::max(highest, guard->normal.dot(corner - guard->point));
+    if (highest <= tolerance.rounding) {
+      // Convex: the whole neighbour lies below the face's plane.
+      contacts.swap_remove(i);
+    } else {
+      // Concave: what stops the slide is the neighbour's own plane.
+      const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+      edge.normal = normal.dot(position - edge.point) < 0.0 ? Vec3(-normal) : normal;
+    }
+  }
+}
+
+}  // namespace asperity

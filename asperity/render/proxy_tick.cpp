@@ -1,0 +1,301 @@
+#include "asperity/render/proxy_tick.h"
+
+#include <algorithm>
+
+#include "asperity/render/god_object.h"
+#include "asperity/render/joint_proxy.h"
+#include "asperity/render/proxy.h"
+
+namespace asperity {
+
+namespace {
+
+const ReliefSurface* proxied_relief(const Instance& instance) noexcept {
+  if (!std::holds_alternative<ProxyLaw>(instance.law)) return nullptr;
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  return relief != nullptr ? relief->get() : nullptr;
+}
+
+/// A sliding contact's force lies on the cone to within what the descent left; here exactly.
+Vec3 on_cone(const Vec3& force, const Vec3& normal, const Friction& friction, bool sliding) noexcept {
+  if (friction.still <= 0.0) return force;
+  const double push = std::max(0.0, force.dot(normal));
+  const Vec3 along = force - push * normal;
+  const double length = along.norm();
+  const double most = (sliding ? friction.sliding : friction.still) * push;
+  return length <= most ? force : Vec3(push * normal + (most / length) * along);
+}
+
+/// One relief, touched by a point.
+ProxyAnswer on_relief(const Instance& instance, const ReliefSurface& relief, ContactState& slot, const Vec3& from,
+                      const ProbeSample& probe) noexcept {
+  const Pose& pose = instance.world_from_object;
+  const bool at_origin = pose.is_identity();
+  const Vec3& position = probe.pose.position;
+  const Friction friction = friction_of(instance);
+  const ProxyRest rest = solve_on_relief(relief, instance.sides, friction, at_origin ? from : pose.apply_inverse(from),
+                                         at_origin ? position : pose.apply_inverse(position), slot);
+  ProxyAnswer answer;
+  answer.converged = rest.converged;
+  answer.proxy = position;
+  LawForce law;
+  if (rest.contact) {
+    law.contact = true;
+    answer.proxy = at_origin ? rest.proxy : pose.apply(rest.proxy);
+    law.normal = at_origin ? rest.normal : pose.rotate(rest.normal);
+    const Vec3 spring = answer.proxy - position;
+    law.penetration = spring.norm();
+    law.force = with_damping(on_cone(instance.material.stiffness * spring, law.normal, friction, slot.sliding),
+                             law.normal, probe.twist.linear, instance.material.damping);
+    law.point = answer.proxy;
+    law.height = slot.point.jet.height;
+    law.element = slot.hint.relief.frame.face;
+  }
+  answer.felt = answer.proxy;
+  answer.parts.push_back({slot.instance, law});
+  return answer;
+}
+
+/// Adds consistent shading's lateral force as far as its budget goes: against the motion it is free and fills the
+/// budget, along the motion it spends it.
+void add_turn(ContactState& slot, LawForce& law, const Vec3& moved) noexcept {
+  constexpr double full_budget = 1e-6;  // J from which on nothing is held back
+  constexpr double changeover = 0.1;    // cosine between force and motion over which the two cases blend
+  slot.turn_budget -= slot.turned.dot(moved);
+  slot.turned = Vec3::Zero();
+  if (!law.contact || law.turn.isZero()) return;
+  const double size = law.turn.norm() * moved.norm();
+  const double cosine = size > 0.0 ? law.turn.dot(moved) / size : 0.0;
+  const double along = std::clamp(0.5 + 0.5 * cosine / changeover, 0.0, 1.0);
+  const double budget = std::clamp(slot.turn_budget / full_budget, 0.0, 1.0);
+  const double giving = along * along * (3.0 - 2.0 * along);
+  slot.turned = (1.0 + giving * (budget - 1.0)) * law.turn;
+  law.force += slot.turned;
+}
+
+/// The coefficients and the normal that friction on several planes goes by: those of the one that pushes most.
+struct Hold {
+  Friction friction;
+  Vec3 normal = Vec3::Zero();
+};
+
+template <class InstanceOf>
+Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const InstanceOf& instance_of) noexcept {
+  const PlaneProjection projection = project_onto_planes(goal, planes, false);
+  Hold hold;
+  double strongest = 0.0;
+  for (const PlaneProjection::Active& active : projection.active) {
+    if (active.multiplier <= strongest) continue;
+    strongest = active.multiplier;
+    hold.friction = friction_of(instance_of(planes[active.plane].owner));
+  }
+  const Vec3 push = projection.point - goal;
+  const double length = push.norm();
+  if (length > 0.0) hold.normal = push / length;
+  return hold;
+}
+
+/// Solves with Coulomb friction: each round leads the proxy to the probe as far as the cone lets it go.
+template <class Touched, class Solve, class InstanceOf>
+ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
+                                       const Touched& touched, const Solve& solve,
+                                       const InstanceOf& instance_of) noexcept {
+  constexpr int most_rounds = 4;
+  constexpr double on_cone = 1e-6;
+  ConstraintSolution solution;
+  Vec3 proxy = from;
+  goal = probe;
+  PlaneSet planes;
+  touched(proxy, planes);
+  bool held = false;
+  // The spring's force is its own, whatever its direction: what the planes hold is the push, the rest is friction's.
+  const auto stick = [&](const Vec3& at, const PlaneSet& on) {
+    ConstraintSolution still;
+    still.proxy = at;
+    still.planes = on;
+    still.converged = true;
+    still.projection = project_onto_planes(probe, on, false);
+    goal = at - (still.projection.point - probe);
+    still.projection.point = at;
+    return still;
+  };
+  for (int round = 0; round < most_rounds; ++round) {
+    const Hold hold = strongest_hold(planes, probe, instance_of);
+    if (hold.friction.still <= 0.0 || hold.normal.isZero()) {
+      // In free space, or without friction, the proxy goes all the way; what it meets then decides.
+      goal = probe;
+      solution = solve(proxy, goal);
+      if (planes.empty() && !solution.planes.empty() && round == 0) {
+        const Hold met = strongest_hold(solution.planes, probe, instance_of);
+        if (met.friction.still > 0.0) {
+          // It met something with friction: it would have stopped there, not slid on for nothing.
+          planes = solution.planes;
+          proxy = solution.proxy;
+          held = true;
+          continue;
+        }
+      }
+      sliding = false;
+      return solution;
+    }
+    const double coefficient = sliding ? hold.friction.sliding * (1.0 + on_cone) : hold.friction.still;
+    if (friction_goal(proxy, hold.normal, probe, coefficient) == proxy) {
+      sliding = round > 0 && !held;
+      return stick(proxy, planes);
+    }
+    goal = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
+    sliding = true;
+    solution = solve(proxy, goal);
+    if ((solution.proxy - probe).squaredNorm() > (proxy - probe).squaredNorm() * (1.0 + 1e-12)) {
+      // On a bent surface the spring would gain: the proxy stays.
+      return stick(proxy, planes);
+    }
+    proxy = solution.proxy;
+    planes = solution.planes;
+  }
+  return solution;
+}
+
+/// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
+void limit_energy(const Scene& scene, ProxyState& state, const Vec3& before, const Vec3& probe,
+                  ProxyAnswer& answer) noexcept {
+  double stiffness = 0.0;
+  double strongest = 0.0;
+  for (const ProxyAnswer::Part& part : answer.parts) {
+    if (!part.law.contact || part.law.penetration < strongest) continue;
+    strongest = part.law.penetration;
+    stiffness = scene.instances()[part.instance].material.stiffness;
+  }
+  if (stiffness == 0.0) {
+    state.stiffness = 0.0;
+    return;
+  }
+  if (state.stiffness > 0.0) {
+    constexpr double rounding = 1e-9;
+    const double may = 0.5 * state.stiffness * (before - probe).squaredNorm();
+    const double would = 0.5 * stiffness * (answer.proxy - probe).squaredNorm();
+    if (would > may * (1.0 + rounding)) {
+      const double paid = state.tank.pay(would - may);
+      if (paid < would - may) {
+        const double share = (may + paid) / would;
+        stiffness *= share;
+        answer.energy_limited = true;
+        for (ProxyAnswer::Part& part : answer.parts) part.law.force *= share;
+      }
+    } else {
+      state.tank.fill(may - would);
+    }
+  }
+  state.stiffness = stiffness;
+}
+
+}  // namespace
+
+ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held) noexcept {
+  const Vec3& position = probe.pose.position;
+  const Vec3 before = state.proxy;
+  const ReliefSurface* relief = nullptr;
+  ContactState* relief_slot = nullptr;
+  std::size_t constrained = 0;
+  for (ContactState& slot : state.contacts) {
+    const Instance& instance = scene.instances()[slot.instance];
+    if (!constrains(instance.law)) continue;
+    ++constrained;
+    if (const ReliefSurface* one = proxied_relief(instance)) {
+      relief = one;
+      relief_slot = &slot;
+    }
+  }
+  ProxyAnswer answer;
+  answer.proxy = answer.felt = position;
+  if (constrained == 0) {
+    state.stiffness = 0.0;
+    return answer;
+  }
+  const auto gather = [&](auto& solver, const ConstraintSolution& solution, const Vec3& goal) {
+    answer.proxy = solution.proxy;
+    answer.converged = solution.converged && solver.complete();
+    // While friction holds it, the proxy is where it is, not where the goal would have it.
+    const bool settled = solution.converged && solution.projection.feasible;
+    answer.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
+    for (std::size_t i = 0; i < solver.size(); ++i) {
+      LawForce law = owner_force(solver.instance(i), i, solution, goal, probe);
+      if (std::holds_alternative<ForceShadingLaw>(solver.instance(i).law))
+        add_turn(solver.state(i), law, position - state.previous_probe);
+      answer.parts.push_back({solver.state(i).instance, law});
+    }
+  };
+  if (relief == nullptr) {
+    MeshConstraints constraints(scene.probe_radius());
+    for (ContactState& slot : state.contacts) {
+      if (constrains(scene.instances()[slot.instance].law)) constraints.add(scene.instances()[slot.instance], slot);
+    }
+    Vec3 goal;
+    const ConstraintSolution solution = solve_with_friction(
+        before, position, state.sliding, goal,
+        [&](const Vec3& at, PlaneSet& planes) { constraints.contacts(at, planes); },
+        [&](const Vec3& from, const Vec3& to) { return solve_constraints(constraints, from, to); },
+        [&](std::uint32_t owner) -> const Instance& { return constraints.instance(owner); });
+    gather(constraints, solution, goal);
+  } else if (constrained == 1 && scene.probe_radius() == 0.0) {
+    answer = on_relief(scene.instances()[relief_slot->instance], *relief, *relief_slot, before, probe);
+  } else {
+    JointProxy joint(scene.probe_radius());
+    Vec3 from = before;
+    for (ContactState& slot : state.contacts) {
+      const Instance& instance = scene.instances()[slot.instance];
+      if (!constrains(instance.law)) continue;
+      joint.add(instance, slot);
+      if (slot.touching && proxied_relief(instance) != nullptr) {
+        // Held as a point until now: a little off the surface it may roll.
+        const Vec3 normal = slot.side * slot.point.normal();
+        from += 2.0 * proxied_relief(instance)->skin() * instance.world_from_object.rotate(normal);
+      }
+      slot.touching = false;
+    }
+    Vec3 goal;
+    const ConstraintSolution solution = solve_with_friction(
+        from, position, state.sliding, goal, [&](const Vec3& at, PlaneSet& planes) { joint.touched(at, planes); },
+        [&](const Vec3& start, const Vec3& to) { return joint.solve(start, to); },
+        [&](std::uint32_t owner) -> const Instance& { return joint.instance(owner); });
+    gather(joint, solution, goal);
+  }
+  limit_energy(scene, state, held, position, answer);
+  return answer;
+}
+
+Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
+  Vec3 proxy = state.proxy;
+  for (ContactState& slot : state.contacts) {
+    const Instance& instance = scene.instances()[slot.instance];
+    if (instance.sides != Sides::front || !constrains(instance.law)) continue;
+    const Pose& pose = instance.world_from_object;
+    const Vec3 local = pose.apply_inverse(proxy);
+    Vec3 front;
+    Foot foot;
+    double skin = 0.0;
+    if (const ReliefSurface* relief = proxied_relief(instance)) {
+      foot = relief->closest(local, infinity, slot.hint);
+      if (!foot.found()) continue;
+      front = relief->point(slot.hint.relief.frame, slot.hint.relief.u, slot.hint.relief.v).normal();
+      skin = relief->skin();
+    } else if (const MeshSurface* mesh = constraint_mesh(instance)) {
+      foot = mesh->closest(local, infinity, slot.hint);
+      if (!foot.found()) continue;
+      front = pseudonormal(mesh->mesh(), foot.element, foot.barycentric).normalized();
+      skin = mesh->skin();
+    } else {
+      GeneratedPatch patch;
+      patch.start(**std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface),
+                  *std::get_if<GeneratedGeometryLaw>(&instance.law));
+      foot = patch.closest(local, slot.hint);
+      if (!foot.found()) continue;
+      front = foot.normal;
+      skin = patch.skin();
+    }
+    if ((local - foot.point).dot(front) < 0.0) proxy = pose.apply(foot.point + (skin + scene.probe_radius()) * front);
+  }
+  return proxy;
+}
+
+}  // namespace asperity

@@ -1,0 +1,32 @@
+#pragma once
+// Baking: any surface near a mesh, written down as heights over it along the shell's rays.
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "asperity/core/progress.h"
+#include "asperity/core/result.h"
+#include "asperity/surface/shell.h"
+
+namespace asperity {
+
+/// Height h (m) at which origin + h direction lies on the surface to be baked, near h = 0. `direction` is not unit.
+using RayHeight = std::function<double(const Vec3& origin, const Vec3& direction)>;
+
+/// A height image in which every triangle of a mesh has a tile of its own, with a border around it that holds the
+/// surface as it goes on beyond the triangle, so that reconstruction near its edges sees no seam.
+struct ReliefAtlas {
+  int width = 0;                                 ///< texels
+  int height = 0;                                ///< texels
+  std::vector<float> heights;                    ///< m, row 0 on top, as HeightMap::build takes them
+  std::vector<std::array<Vec2f, 3>> corner_uvs;  ///< per triangle, for MeshSource
+};
+
+/// Bakes with `texels` texels along each edge of a triangle. The heights are along the directions of `shell`, which the
+/// mesh that wears the atlas must have too (the same positions give the same directions). Errors: bad_value (texels
+/// below 2, a height that is not finite, naming the face), too_large. [build]
+Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, int texels, const RayHeight& ray,
+                                const Progress& progress = {});
+
+}  // namespace asperity

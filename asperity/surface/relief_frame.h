@@ -1,0 +1,48 @@
+#pragma once
+// One triangle of a relief, ready to be evaluated, and what evaluating it gives.
+
+#include <cstdint>
+
+#include "asperity/surface/coat.h"
+#include "asperity/surface/shell.h"
+
+namespace asperity {
+
+/// Everything that evaluating a relief over one triangle needs: copied once when a probe comes onto the triangle, so
+/// that staying on it touches no mesh data.
+struct ReliefFrame {
+  std::uint64_t owner = 0;  ///< identity of the surface's index; 0: nothing
+  std::uint32_t face = no_index;
+  bool stitched = false;  ///< whether `band` means anything
+  bool partly = false;    ///< whether `seam` is not 1 throughout
+  bool lowered = false;   ///< whether `share` is not 1 throughout
+  ShellPrism prism;
+  CoatFrame coat;
+  StitchBand band;
+  double seam = 1.0;  ///< how much the faces around have a say at the first corner (0 or 1), and its change
+  double seam_u = 0.0;
+  double seam_v = 0.0;
+  double share = 1.0;  ///< of the coat's height that is rendered at the first corner, and its change along u and v
+  double share_u = 0.0;
+  double share_v = 0.0;
+};
+
+/// A point of the displaced surface x(u, v) = V + H N over one triangle, with its tangents (m).
+struct ReliefPoint {
+  Vec3 position = Vec3::Zero();
+  Vec3 along_u = Vec3::Zero();
+  Vec3 along_v = Vec3::Zero();
+  Vec3 outward = Vec3::Zero();  ///< unit normal
+  HeightJet jet;                ///< of the height as rendered: stitched and lowered
+  /// Unit, outward. [servo]
+  [[nodiscard]] const Vec3& normal() const noexcept { return outward; }
+};
+
+/// Where a probe last was on a relief: a cache, like TrianglePatch.
+struct ReliefPlace {
+  ReliefFrame frame;
+  double u = 0.0;
+  double v = 0.0;
+};
+
+}  // namespace asperity

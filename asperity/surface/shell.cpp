@@ -1,0 +1,286 @@
+#include "asperity/surface/shell.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace asperity {
+
+namespace {
+
+// Directions longer than this would magnify a relief sideways at spikes more than its height is worth.
+constexpr double longest_direction = 3.0;
+// Least cosine-like product N . n that a direction must keep with every face around it.
+constexpr double least_product = 0.1;
+
+struct WeightedNormal {
+  Vec3 normal;
+  double weight;
+};
+
+std::vector<WeightedNormal> normals_around(const TriangleMesh& mesh, std::uint32_t vertex) {
+  std::vector<WeightedNormal> around;
+  for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+    const TriangleMesh::Triangle& corners = mesh.triangles()[face];
+    std::size_t k = 0;
+    while (corners[k] != vertex) ++k;
+    const Vec3& here = mesh.positions()[vertex];
+    const Vec3 one = mesh.positions()[corners[(k + 1) % 3]] - here;
+    const Vec3 other = mesh.positions()[corners[(k + 2) % 3]] - here;
+    around.push_back({mesh.face_normal(face), std::atan2(one.cross(other).norm(), one.dot(other))});
+  }
+  return around;
+}
+
+double least_normal_product(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+  double least = infinity;
+  for (const WeightedNormal& face : around) least = std::min(least, face.normal.dot(direction));
+  return least;
+}
+
+/// Length that brings N . n to 1 in the mean of squares, for a given direction.
+Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+  double once = 0.0;
+  double twice = 0.0;
+  for (const WeightedNormal& face : around) {
+    const double product = face.normal.dot(direction);
+    once += face.weight * product;
+    twice += face.weight * product * product;
+  }
+  const double length = twice > 0.0 ? once / twice : 1.0;
+  return std::clamp(length, 0.5, longest_direction) * direction;
+}
+
+/// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings).
+Vec3 least_squares(const std::vector<WeightedNormal>& around, const Vec3& normal) {
+  constexpr double hold = 1e-3;
+  Mat3 matrix = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  double total = 0.0;
+  for (const WeightedNormal& face : around) {
+    matrix += face.weight * face.normal * face.normal.transpose();
+    right += face.weight * face.normal;
+    total += face.weight;
+  }
+  if (total == 0.0) return normal;
+  matrix += hold * total * Mat3::Identity();
+  right += hold * total * scaled(around, normal);
+  return matrix.inverse() * right;
+}
+
+/// The direction whose least product with the normals around is largest, by pulling towards the worst one.
+Vec3 most_seen(const std::vector<WeightedNormal>& around, const Vec3& start) {
+  Vec3 best = start;
+  double best_product = least_normal_product(around, start);
+  Vec3 direction = start;
+  for (int i = 1; i <= 400; ++i) {
+    const auto worst = std::min_element(around.begin(), around.end(), [&](const auto& a, const auto& b) {
+      return a.normal.dot(direction) < b.normal.dot(direction);
+    });
+    direction = (direction + worst->normal / (1.0 + 0.25 * i)).normalized();
+    const double product = least_normal_product(around, direction);
+    if (product > best_product) {
+      best_product = product;
+      best = direction;
+    }
+  }
+  return best;
+}
+
+/// Interval around 0 on which c0 + c1 h + c2 h^2 stays above `share` of c0 (> 0), cut into `interval`.
+void cut_by_quadratic(double c0, double c1, double c2, ShellInterval& interval) {
+  // What is left of the volume where the shell is squeezed most; the rest is margin against its folding over.
+  constexpr double share = 0.05;
+  const double c = (1.0 - share) * c0;
+  const double discriminant = c1 * c1 - 4.0 * c2 * c;
+  double roots[2] = {infinity, infinity};
+  if (std::abs(c2) * interval.upper * interval.upper <= 1e-14 * c0 &&
+      std::abs(c2) * interval.lower * interval.lower <= 1e-14 * c0) {
+    if (c1 != 0.0) roots[0] = -c / c1;
+  } else if (discriminant >= 0.0) {
+    const double q = -0.5 * (c1 + std::copysign(std::sqrt(discriminant), c1));
+    if (c2 != 0.0) roots[0] = q / c2;
+    if (q != 0.0) roots[1] = c / q;
+  }
+  for (const double root : roots) {
+    if (root > 0.0) interval.upper = std::min(interval.upper, root);
+    if (root < 0.0) interval.lower = std::max(interval.lower, root);
+  }
+}
+
+/// Real roots of a h^3 + b h^2 + c h + d.
+int cubic_roots(double a, double b, double c, double d, double roots[3]) noexcept {
+  const double size = std::abs(a) + std::abs(b) + std::abs(c) + std::abs(d);
+  if (std::abs(a) <= 1e-14 * size) {
+    if (std::abs(b) <= 1e-14 * size) {
+      if (c == 0.0) return 0;
+      roots[0] = -d / c;
+      return 1;
+    }
+    const double discriminant = c * c - 4.0 * b * d;
+    if (discriminant < 0.0) return 0;
+    const double q = -0.5 * (c + std::copysign(std::sqrt(discriminant), c));
+    roots[0] = q / b;
+    if (q == 0.0) return 1;
+    roots[1] = d / q;
+    return 2;
+  }
+  const double p = b / (3.0 * a);
+  const double q = (c / a - 3.0 * p * p) / 3.0;
+  const double r = 0.5 * (d / a - p * (c / a) + 2.0 * p * p * p);
+  const double discriminant = q * q * q + r * r;
+  if (discriminant > 0.0) {
+    const double s = std::sqrt(discriminant);
+    roots[0] = std::cbrt(-r + s) + std::cbrt(-r - s) - p;
+    return 1;
+  }
+  const double radius = 2.0 * std::sqrt(std::max(0.0, -q));
+  const double third =
+      radius > 0.0 ? std::acos(std::clamp(-8.0 * r / (radius * radius * radius), -1.0, 1.0)) / 3.0 : 0.0;
+  for (int k = 0; k < 3; ++k) roots[k] = radius * std::cos(third + 2.0 * std::numbers::pi * k / 3.0) - p;
+  return 3;
+}
+
+/// Moves each direction towards the mean of its neighbours' as far as every face around still sees it.
+void relax(const TriangleMesh& mesh, const std::vector<std::vector<WeightedNormal>>& around,
+           std::vector<Vec3>& directions) {
+  constexpr int rounds = 30;
+  std::vector<Vec3> sum(directions.size());
+  std::vector<double> count(directions.size());
+  for (int round = 0; round < rounds; ++round) {
+    std::fill(sum.begin(), sum.end(), Vec3::Zero());
+    std::fill(count.begin(), count.end(), 0.0);
+    for (const TriangleMesh::Triangle& t : mesh.triangles()) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        sum[t[k]] += directions[t[(k + 1) % 3]] + directions[t[(k + 2) % 3]];
+        count[t[k]] += 2.0;
+      }
+    }
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      if (count[i] == 0.0) continue;
+      const Vec3 moved = scaled(around[i], (directions[i] + sum[i] / count[i]).normalized());
+      // A height over each face may then differ from the metric one by a third at most.
+      if (least_normal_product(around[i], moved) > std::min(0.67, 0.9 * least_normal_product(around[i], directions[i])))
+        directions[i] = moved;
+    }
+  }
+}
+
+}  // namespace
+
+bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
+  constexpr int most_steps = 16;
+  double last = infinity;
+  for (int i = 0; i < most_steps; ++i) {
+    const Vec3 du = edge_u + place.height * turn_u;
+    const Vec3 dv = edge_v + place.height * turn_v;
+    const Vec3 dh = direction_at(place.u, place.v);
+    const Vec3 rest = p - base_at(place.u, place.v) - place.height * dh;
+    const Vec3 across = du.cross(dv);
+    const double det = across.dot(dh);
+    if (!(std::abs(det) > 0.0)) return false;
+    const Vec3 turned = rest.cross(dh);
+    const double step_u = -dv.dot(turned) / det;
+    const double step_v = du.dot(turned) / det;
+    const double step_h = across.dot(rest) / det;
+    place.u += step_u;
+    place.v += step_v;
+    place.height += step_h;
+    // In u and v an edge is 1; heights are measured by the triangle's size.
+    const double change = std::abs(step_u) + std::abs(step_v) + std::abs(step_h) / std::sqrt(across.norm());
+    if (!(change < 1e6)) return false;
+    if (change <= 1e-13 || (change <= 1e-6 && change >= last)) return determinant(place) > 0.0;
+    last = change;
+  }
+  return false;
+}
+
+bool ShellPrism::invert_anew(const Vec3& p, ShellPlace& place) const noexcept {
+  const Vec3 offset = p - corner;
+  // (offset - h direction) . ((edge_u + h turn_u) x (edge_v + h turn_v)) = 0
+  const Vec3 c0 = edge_u.cross(edge_v);
+  const Vec3 c1 = edge_u.cross(turn_v) + turn_u.cross(edge_v);
+  const Vec3 c2 = turn_u.cross(turn_v);
+  double roots[3];
+  const int count = cubic_roots(-direction.dot(c2), offset.dot(c2) - direction.dot(c1),
+                                offset.dot(c1) - direction.dot(c0), offset.dot(c0), roots);
+  double best = -infinity;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 along_u = edge_u + roots[i] * turn_u;
+    const Vec3 along_v = edge_v + roots[i] * turn_v;
+    const Vec3 normal = along_u.cross(along_v);
+    const Vec3 inside = offset - roots[i] * direction;
+    const double area = normal.squaredNorm();
+    if (!(area > 0.0)) continue;
+    ShellPlace at{inside.cross(along_v).dot(normal) / area, along_u.cross(inside).dot(normal) / area, roots[i]};
+    if (!invert(p, at)) continue;
+    const double insideness = at.barycentric().minCoeff();
+    if (insideness <= best) continue;
+    best = insideness;
+    place = at;
+  }
+  return best > -infinity;
+}
+
+ShellGradients shell_gradients(const ShellPrism& prism, const ShellPlace& at) noexcept {
+  const Vec3 du = prism.edge_u + at.height * prism.turn_u;
+  const Vec3 dv = prism.edge_v + at.height * prism.turn_v;
+  const Vec3 dh = prism.direction_at(at.u, at.v);
+  const Vec3 across = du.cross(dv);
+  const double per = 1.0 / across.dot(dh);
+  return {per * dv.cross(dh), per * dh.cross(du), per * across};
+}
+
+ShellInterval ShellPrism::injective(double margin, double limit) const noexcept {
+  ShellInterval interval{-limit, limit};
+  const Vec3 c0 = edge_u.cross(edge_v);
+  const Vec3 c1 = edge_u.cross(turn_v) + turn_u.cross(edge_v);
+  const Vec3 c2 = turn_u.cross(turn_v);
+  for (int k = 0; k < 3; ++k) {
+    const double u = k == 1 ? 1.0 + 2.0 * margin : -margin;
+    const double v = k == 2 ? 1.0 + 2.0 * margin : -margin;
+    const Vec3 n = direction_at(u, v);
+    if (!(n.dot(c0) > 0.0)) return {0.0, 0.0};
+    cut_by_quadratic(n.dot(c0), n.dot(c1), n.dot(c2), interval);
+  }
+  return interval;
+}
+
+Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
+  Shell shell;
+  const std::size_t count = mesh.positions().size();
+  std::vector<Vec3> directions(count);
+  std::vector<std::vector<WeightedNormal>> around;
+  if (how == ShellDirections::relaxed) around.resize(count);
+  for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
+    std::vector<WeightedNormal> here = normals_around(mesh, vertex);
+    const Vec3 normal = mesh.vertex_normal(vertex);
+    directions[vertex] = normal;
+    if (!here.empty()) {
+      Vec3 direction = least_squares(here, normal);
+      const bool safe = least_normal_product(here, direction) >= least_product && direction.norm() <= longest_direction;
+      if (!safe) {
+        const Vec3 seen = most_seen(here, normal);
+        direction = scaled(here, seen);
+        ++shell.turned_vertices;
+        if (least_normal_product(here, seen) <= 1e-3) shell.blind_vertices.push_back(vertex);
+      }
+      directions[vertex] = direction;
+    }
+    if (how == ShellDirections::relaxed) around[vertex] = std::move(here);
+  }
+  if (how == ShellDirections::relaxed) relax(mesh, around, directions);
+  shell.directions.reserve(count);
+  for (const Vec3& direction : directions) shell.directions.push_back(direction.cast<float>());
+  return shell;
+}
+
+ShellPrism Shell::prism(const TriangleMesh& mesh, std::uint32_t face) const noexcept {
+  const TriangleMesh::Triangle& t = mesh.triangles()[face];
+  const Vec3& a = mesh.positions()[t[0]];
+  const Vec3 n = directions[t[0]].cast<double>();
+  return {a, mesh.positions()[t[1]] - a,          mesh.positions()[t[2]] - a,
+          n, directions[t[1]].cast<double>() - n, directions[t[2]].cast<double>() - n};
+}
+
+}  // namespace asperity

@@ -1,0 +1,174 @@
+#include "asperity/surface/stitching.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace asperity {
+
+namespace {
+
+struct FaceShape {
+  double height[3];  ///< over the edge opposite corner k (m)
+  double angle[3];   ///< at corner k
+};
+
+FaceShape shape_of(const TriangleMesh& mesh, std::uint32_t face) {
+  const auto corners = mesh.corners(face);
+  FaceShape shape{};
+  const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 one = corners[(k + 1) % 3] - corners[k];
+    const Vec3 other = corners[(k + 2) % 3] - corners[k];
+    shape.height[k] = twice_area / (corners[(k + 2) % 3] - corners[(k + 1) % 3]).norm();
+    shape.angle[k] = std::atan2(one.cross(other).norm(), one.dot(other));
+  }
+  return shape;
+}
+
+/// Edge opposite corner k, in the mesh's own numbering of edges.
+constexpr int edge_opposite(int corner) {
+  return (corner + 1) % 3;
+}
+
+/// How far from each vertex (m) a face around it may still have a say. Around a vertex a band of width w meets the far
+/// side of a corner of angle a within w / sin(a / 2); folds turn angles a little, which the factor leaves room for.
+std::vector<double> reaches(const TriangleMesh& mesh, const std::vector<std::array<double, 3>>& widths,
+                            const std::vector<FaceShape>& shapes) {
+  constexpr double room = 1.5;
+  std::vector<double> widest(mesh.positions().size(), 0.0);
+  std::vector<double> sharpest(mesh.positions().size(), 1.0);
+  for (std::size_t face = 0; face < shapes.size(); ++face) {
+    const TriangleMesh::Triangle& t = mesh.triangles()[face];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double wide = std::max(widths[face][(k + 1) % 3], widths[face][(k + 2) % 3]);
+      widest[t[k]] = std::max(widest[t[k]], wide);
+      sharpest[t[k]] = std::min(sharpest[t[k]], std::sin(0.5 * std::min(shapes[face].angle[k], 1.57)));
+    }
+  }
+  for (std::size_t i = 0; i < widest.size(); ++i) widest[i] = room * widest[i] / std::max(sharpest[i], 1e-6);
+  return widest;
+}
+
+/// How far into `face`, against how far into `other`, a place of `face` lies beyond their common edge when both are
+/// seen along the directions of the edge's ends: 1 where those are symmetric, the lesser of both ends.
+double mirror_ratio(const TriangleMesh& mesh, const Shell& shell, std::uint32_t face, int corner, std::uint32_t other) {
+  const TriangleMesh::Triangle& t = mesh.triangles()[face];
+  const std::uint32_t ends[2] = {t[static_cast<std::size_t>((corner + 1) % 3)],
+                                 t[static_cast<std::size_t>((corner + 2) % 3)]};
+  const Vec3 along = (mesh.positions()[ends[1]] - mesh.positions()[ends[0]]).normalized();
+  const Vec3 normal = mesh.face_normal(other);
+  const Vec3 into = mesh.face_normal(face).cross(along);
+  const Vec3 into_other = -normal.cross(along);
+  double least = 1.0;
+  for (const std::uint32_t end : ends) {
+    const Vec3 direction = shell.directions[end].cast<double>();
+    const double seen = normal.dot(direction);
+    if (seen <= 0.0) return 0.0;
+    least = std::min(least, -into_other.dot(into) + normal.dot(into) * into_other.dot(direction) / seen);
+  }
+  return least;
+}
+
+}  // namespace
+
+Status validate(const Stitching& stitching) {
+  if (!(stitching.rho > 0.0 && stitching.rho <= 1.0 / 3.0)) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {:g}", stitching.rho),
+                 {},
+                 "rho",
+                 "a width above 0, at most 1/3 of a triangle's height"};
+  }
+  if (stitching.blend != Blend::image) return success();
+  if (stitching.blend_map.size() < 2) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("has {} weights", stitching.blend_map.size()),
+                 {},
+                 "blend_map",
+                 "at least two weights, from outside to inside"};
+  }
+  for (const double weight : stitching.blend_map) {
+    if (!(weight >= 0.0 && weight <= 1.0)) {
+      return Error{
+          ErrorCode::bad_value, fmt::format("holds the weight {:g}", weight), {}, "blend_map", "weights from 0 to 1"};
+    }
+  }
+  if (stitching.blend_map.back() <= 0.0) {
+    return Error{ErrorCode::bad_value, "ends in 0", {}, "blend_map", "a last weight (inside the face) above 0"};
+  }
+  return success();
+}
+
+BlendValue blend_value(const Stitching& stitching, double rho, double barycentric) noexcept {
+  if (stitching.blend == Blend::none || rho <= 0.0) return {barycentric >= 0.0 ? 1.0 : 0.0, 0.0};
+  const double per = 1.0 / (2.0 * rho);
+  const double t = std::clamp((barycentric + rho) * per, 0.0, 1.0);
+  const bool within = t > 0.0 && t < 1.0;
+  switch (stitching.blend) {
+    case Blend::linear: return {t, within ? per : 0.0};
+    case Blend::s_shape: return {t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * per};
+    case Blend::quintic: return {t * t * t * (10.0 + t * (6.0 * t - 15.0)), 30.0 * t * t * (1.0 - t) * (1.0 - t) * per};
+    default: break;
+  }
+  const auto last = static_cast<double>(stitching.blend_map.size() - 1);
+  const auto cell = static_cast<std::size_t>(std::min(t * last, last - 1.0));
+  const double rise = stitching.blend_map[cell + 1] - stitching.blend_map[cell];
+  return {stitching.blend_map[cell] + (t * last - static_cast<double>(cell)) * rise, within ? rise * last * per : 0.0};
+}
+
+std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shell, double rho) {
+  const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
+  std::vector<FaceShape> shapes;
+  shapes.reserve(faces);
+  for (std::uint32_t face = 0; face < faces; ++face) shapes.push_back(shape_of(mesh, face));
+  std::vector<std::array<double, 3>> widths(faces);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    for (int k = 0; k < 3; ++k) {
+      const auto corner = static_cast<std::size_t>(k);
+      double least = shapes[face].height[corner];
+      const std::uint32_t other = mesh.neighbour(face, edge_opposite(k));
+      if (other != no_index) {
+        for (int j = 0; j < 3; ++j) {
+          if (mesh.neighbour(other, edge_opposite(j)) == face)
+            least = std::min(least, shapes[other].height[static_cast<std::size_t>(j)]);
+        }
+      }
+      widths[face][corner] = rho * least;
+    }
+  }
+  // The say of the faces around a vertex must end well before the opposite edges.
+  constexpr double most_of_height = 0.45;
+  std::vector<double> reach = reaches(mesh, widths, shapes);
+  std::vector<double> share(reach.size(), 1.0);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = mesh.triangles()[face][k];
+      if (reach[vertex] > 0.0)
+        share[vertex] = std::min(share[vertex], most_of_height * shapes[face].height[k] / reach[vertex]);
+    }
+  }
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    const TriangleMesh::Triangle& t = mesh.triangles()[face];
+    for (std::size_t k = 0; k < 3; ++k) widths[face][k] *= std::min(share[t[(k + 1) % 3]], share[t[(k + 2) % 3]]);
+  }
+  reach = reaches(mesh, widths, shapes);
+  std::vector<StitchBand> bands(faces);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      bands[face].rho[k] = static_cast<float>(widths[face][k] / shapes[face].height[k]);
+      const int corner = static_cast<int>(k);
+      const std::uint32_t other = mesh.neighbour(face, edge_opposite(corner));
+      constexpr double least_ratio = 0.25;
+      const double ratio =
+          other == no_index ? 1.0 : std::max(least_ratio, mirror_ratio(mesh, shell, face, corner, other));
+      bands[face].look[k] = 1.01F * bands[face].rho[k] / static_cast<float>(ratio);
+      bands[face].reach[k] =
+          static_cast<float>(std::min(1.0, reach[mesh.triangles()[face][k]] / shapes[face].height[k]));
+    }
+  }
+  return bands;
+}
+
+}  // namespace asperity

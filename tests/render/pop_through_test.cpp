@@ -1,0 +1,233 @@
+// T5: nothing is passed through, however thin and however fast (formulation D6, D8).
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <string>
+
+#include "tests/render/fixtures.h"
+#include "tests/surface/reliefs.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+/// A closed sheet of `thickness` with relief all over, less than half as high.
+std::shared_ptr<const ReliefSurface> sheet(double thickness) {
+  return relief_on(mesh_of(box_mesh(Vec3(0.02, 0.02, thickness))), {tiled(wavy_map(0.4 * thickness), 0.01)},
+                   CoatSettings{Mapping::triplanar, Vec2::Ones(), {}});
+}
+
+/// A displaced icosphere with H_1 laid per face, stitched.
+std::shared_ptr<const ReliefSurface> ridged_sphere(double radius, double amplitude, const Stitching& stitching) {
+  MesostructureSpec spec;
+  spec.kind = MesostructureKind::serrated;
+  spec.size = 32;
+  spec.amplitude = amplitude;
+  spec.count = 4;
+  spec.wall = 0.25;
+  auto maps = tiled(must(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline)));
+  return relief_on(mesh_of(icosphere(1, radius)), {std::move(maps)},
+                   CoatSettings{Mapping::per_face, Vec2::Ones(), stitching});
+}
+
+struct Closed {
+  std::string name;
+  std::shared_ptr<const ReliefSurface> surface;
+  int cells;  // of the tessellation, along the edges of a face
+};
+
+const std::vector<Closed>& closed_reliefs() {
+  static const std::vector<Closed> reliefs = {
+      {"sheet of 0.05 mm", sheet(0.05e-3), 60},
+      {"sheet of 0.5 mm", sheet(0.5e-3), 60},
+      {"ridged sphere, folds kept", ridged_sphere(0.01, 0.3e-3, {FoldMode::keep, Blend::quintic, 0.1, {}}), 80},
+      {"ridged sphere, folds rounded", ridged_sphere(0.01, 0.3e-3, {FoldMode::round, Blend::quintic, 0.1, {}}), 80},
+      {"blob",
+       relief_on(mesh_of(random_closed_mesh(3, 2, 0.01, 0.2)), {tiled(wavy_map(2e-4), 0.005)},
+                 CoatSettings{Mapping::triplanar, Vec2::Ones(), {}}),
+       40}};
+  return reliefs;
+}
+
+const Tessellation& dense(std::size_t which) {
+  static const std::vector<Tessellation> all = [] {
+    std::vector<Tessellation> made;
+    for (const Closed& one : closed_reliefs()) made.push_back(tessellate(*one.surface, one.cells));
+    return made;
+  }();
+  return all[which];
+}
+
+/// From a speed of 0.01 to 20 m/s, evenly over the decades: how far a probe moves in 1 ms.
+double random_stride(Rng& rng) {
+  return 1e-3 * 0.01 * std::pow(2000.0, rng.uniform());
+}
+
+/// A point near the surface of the tessellation, at most `off` (m) from it.
+Vec3 random_near(Rng& rng, const TriangleIndex& index, double off) {
+  const TriangleMesh& mesh = index.mesh();
+  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_vector(rng, off);
+}
+
+TEST(T5_pop_through, the_tessellations_are_far_finer_than_what_they_judge) {
+  EXPECT_LT(dense(0).error, 0.02 * 0.05e-3);
+  EXPECT_LT(dense(1).error, 0.02 * 0.5e-3);
+  for (std::size_t i = 2; i < closed_reliefs().size(); ++i) {
+    EXPECT_LT(dense(i).error, 0.1 * closed_reliefs()[i].surface->coat().amplitude_bound()) << closed_reliefs()[i].name;
+  }
+}
+
+TEST(T5_pop_through, a_hundred_thousand_segments_meet_whatever_a_dense_mesh_shows_them_to_cross) {
+  Rng rng(50);
+  for (std::size_t which = 0; which < closed_reliefs().size(); ++which) {
+    const auto& [name, surface, cells] = closed_reliefs()[which];
+    const Tessellation& mesh = dense(which);
+    Hint hint;
+    int crossing = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const double stride = random_stride(rng);
+      const Vec3 from = random_near(rng, mesh.index, 0.5 * stride);
+      if (depth_inside(mesh.index, from) > -2.0 * mesh.error) continue;
+      const Vec3 to = from + stride * random_direction(rng);
+      const FirstHit entry = mesh.index.first_hit({from, to});
+      const SweptHit hit = surface->segment({from, to}, 0.0, i % 2 == 0 ? Sides::both : Sides::front, hint);
+      if (entry.face != no_index) {
+        // Where it is deepest: between where it comes in and where it next goes out, or its end.
+        const Vec3 entered = from + (entry.t + 1e-9) * (to - from);
+        const FirstHit exit = mesh.index.first_hit({entered, to});
+        const Vec3 out = exit.face == no_index ? to : Vec3(entered + exit.t * (to - entered));
+        bool clear = false;
+        for (const double t : {0.25, 0.5, 0.75, 1.0})
+          clear = clear || depth_inside(mesh.index, entered + t * (out - entered)) > 2.0 * mesh.error;
+        if (clear) {
+          ++crossing;
+          ASSERT_TRUE(hit.hit) << name << ", segment " << i << " from " << from.transpose() << " to " << to.transpose();
+        }
+      }
+      if (hit.hit) {
+        const Vec3 touched = from + hit.t * (to - from);
+        ASSERT_LT((touched - hit.contact.point).norm(), surface->skin()) << name << ", segment " << i;
+        ASSERT_LT(std::abs(depth_inside(mesh.index, touched)), 2.0 * mesh.error + surface->skin())
+            << name << ", segment " << i;
+        // Not the second crossing: nothing on the way there lies clearly inside.
+        for (const double t : {0.2, 0.5, 0.8, 0.95}) {
+          ASSERT_LT(depth_inside(mesh.index, from + t * hit.t * (to - from)), 2.0 * mesh.error + surface->skin())
+              << name << ", segment " << i << " from " << from.transpose() << " to " << to.transpose();
+        }
+      }
+    }
+    EXPECT_GT(crossing, 1500) << name;
+  }
+}
+
+/// Moves a probe along straight pieces of random speed; `inside` says what place it is led to next.
+template <class Next, class Check>
+void lead(const Scene& scene, Rng& rng, const Vec3& start, int ticks, const Next& next, const Check& check) {
+  ProxyState state;
+  Vec3 probe = start;
+  touch(scene, state, probe);
+  Vec3 goal = start;
+  double stride = 0.0;
+  for (int i = 0; i < ticks; ++i) {
+    if ((goal - probe).norm() <= stride || i % 200 == 0) {
+      probe = i % 200 == 0 ? probe : goal;
+      goal = next();
+      stride = random_stride(rng);
+    } else {
+      probe += stride * (goal - probe).normalized();
+    }
+    check(i, probe, touch(scene, state, probe));
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
+Scene proxied(const std::shared_ptr<const ReliefSurface>& surface, Sides sides, double friction) {
+  Instance instance;
+  instance.name = "test";
+  instance.surface = surface;
+  instance.sides = sides;
+  instance.material.stiffness = stiffness;
+  instance.material.static_friction = friction;
+  instance.material.dynamic_friction = 0.7 * friction;
+  return must(Scene::build({instance}, 0.0));
+}
+
+TEST(T5_pop_through, a_proxy_on_a_sheet_stays_on_the_side_it_came_from) {
+  // Well away from the rim nothing leads around: the proxy of a probe that starts above stays above.
+  Rng rng(51);
+  for (std::size_t which = 0; which < 2; ++which) {
+    const auto& [name, surface, cells] = closed_reliefs()[which];
+    for (const double friction : {0.0, 0.4}) {
+      for (const Sides sides : {Sides::both, Sides::front}) {
+        const Scene scene = proxied(surface, sides, friction);
+        int pressed = 0;
+        const auto next = [&] {
+          return Vec3(rng.uniform(-3e-3, 3e-3), rng.uniform(-3e-3, 3e-3), rng.uniform(-4e-3, 4e-3));
+        };
+        const auto check = [&, &label = name](int i, const Vec3& probe, const ForceSample& felt) {
+          ASSERT_GT(felt.proxy.z(), 0.0) << label << ", tick " << i << ", probe " << probe.transpose();
+          ASSERT_GE(felt.wrench.force.z(), 0.0) << label << ", tick " << i;
+          pressed += felt.flags.has(TickFlag::contact) ? 1 : 0;
+        };
+        lead(scene, rng, Vec3(0.0, 0.0, 1e-3), 2000, next, check);
+        EXPECT_GT(pressed, 200) << name;
+      }
+    }
+  }
+}
+
+TEST(T5_pop_through, a_proxy_is_never_inside) {
+  Rng rng(52);
+  for (std::size_t which = 0; which < closed_reliefs().size(); ++which) {
+    const auto& [name, surface, cells] = closed_reliefs()[which];
+    const Tessellation& mesh = dense(which);
+    const Box box = surface->bounds().grown(2e-3);
+    for (const double friction : {0.0, 0.4}) {
+      const Scene scene = proxied(surface, Sides::front, friction);
+      int pressed = 0;
+      const auto next = [&] {
+        return Vec3(box.lower + Vec3(rng.uniform(), rng.uniform(), rng.uniform()).cwiseProduct(box.extent()));
+      };
+      const auto check = [&, &label = name](int i, const Vec3& probe, const ForceSample& felt) {
+        const double depth = depth_inside(mesh.index, felt.proxy);
+        ASSERT_LT(depth, 2.0 * mesh.error + surface->skin())
+            << label << ", friction " << friction << ", tick " << i << ", probe " << probe.transpose();
+        if (felt.flags.has(TickFlag::contact)) {
+          ++pressed;
+          // Out of its budget it may still be on its way.
+          if (felt.flags.has(TickFlag::not_converged)) return;
+          ASSERT_GT(depth, -2.0 * mesh.error - surface->skin())
+              << label << ", friction " << friction << ", tick " << i << ", probe " << probe.transpose()
+              << ": it rests on the relief";
+        } else {
+          ASSERT_EQ(felt.proxy, probe) << label << ", tick " << i;
+        }
+      };
+      lead(scene, rng, box.upper, 2000, next, check);
+      EXPECT_GT(pressed, 100) << name;
+    }
+  }
+}
+
+TEST(T5_pop_through, a_proxy_on_an_open_sheet_passes_only_around_its_rim) {
+  const auto surface = relief_on(mesh_of(trial_mesh_a({4, 4, 0.01})), {tiled(wavy_map(5e-4))},
+                                 CoatSettings{Mapping::triplanar, Vec2::Ones(), {}});
+  Rng rng(53);
+  for (const double side : {1.0, -1.0}) {
+    const Scene scene = proxied(surface, Sides::both, 0.0);
+    const auto next = [&] {
+      return Vec3(rng.uniform(-6e-3, 6e-3), rng.uniform(-6e-3, 6e-3), rng.uniform(-4e-3, 4e-3));
+    };
+    Hint hint;
+    const auto check = [&](int i, const Vec3& probe, const ForceSample& felt) {
+      const FieldSample at = surface->eval(felt.proxy, hint);
+      ASSERT_GT(side * at.value, -surface->skin()) << "tick " << i << ", probe " << probe.transpose();
+    };
+    lead(scene, rng, Vec3(0.0, 0.0, side * 2e-3), 10000, next, check);
+  }
+}
+
+}  // namespace
+}  // namespace asperity

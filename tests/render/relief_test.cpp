@@ -1,0 +1,86 @@
+// The relief test: how true the proxy is on a displaced sphere, against the exact god-object on the formula.
+
+#include <algorithm>
+#include <iostream>
+
+#include <fmt/format.h>
+
+#include "tests/render/analytic_relief.h"
+
+namespace asperity::test {
+namespace {
+
+struct Truth {
+  double mean = 0.0;  // degrees between the forces' directions
+  double p99 = 0.0;
+  double largest = 0.0;
+  double jump = 0.0;  // N, largest change of force in one tick
+  double exact_jump = 0.0;
+  std::size_t lost = 0;  // ticks without contact
+  std::size_t flagged = 0;
+};
+
+Truth compare(const WavySphere& sphere, const std::shared_ptr<const ReliefSurface>& relief, double depth,
+              std::size_t ticks) {
+  Instance instance;
+  instance.surface = relief;
+  instance.sides = Sides::front;
+  instance.material.stiffness = stiffness;
+  const Scene scene = must(Scene::build({instance}, 0.0));
+  const double advance = 0.05 * tick.count() / sphere.radius;
+  const std::vector<Vec3> path = winding(advance, ticks);
+  ExactGodObject exact(sphere, path.front());
+  ProxyState state;
+  touch(scene, state, 1.2 * sphere.radius * path.front());
+  std::vector<double> errors;
+  Truth truth;
+  Vec3 last = Vec3::Zero();
+  Vec3 last_exact = Vec3::Zero();
+  for (std::size_t i = 0; i < ticks; ++i) {
+    const Vec3 probe = (sphere.radius - depth) * path[i];
+    const ForceSample felt = touch(scene, state, probe);
+    const Vec3 force = felt.wrench.force;
+    const Vec3 right = stiffness * (exact.follow(probe) - probe);
+    if (!felt.flags.has(TickFlag::contact)) ++truth.lost;
+    if (felt.flags.has(TickFlag::not_converged) || felt.flags.has(TickFlag::energy_limited)) ++truth.flagged;
+    errors.push_back(std::atan2(force.cross(right).norm(), force.dot(right)) * 180.0 / std::numbers::pi);
+    if (i > 0) {
+      truth.jump = std::max(truth.jump, (force - last).norm());
+      truth.exact_jump = std::max(truth.exact_jump, (right - last_exact).norm());
+    }
+    last = force;
+    last_exact = right;
+  }
+  for (const double error : errors) truth.mean += error / static_cast<double>(errors.size());
+  std::sort(errors.begin(), errors.end());
+  truth.p99 = errors[errors.size() * 99 / 100];
+  truth.largest = errors.back();
+  return truth;
+}
+
+Truth report(const WavySphere& sphere, int subdivisions, int texels) {
+  const Truth truth = compare(sphere, baked(sphere, subdivisions, texels), 1.2e-3, 100000);
+  std::cout << fmt::format(
+      "{} triangles, {:.2f} mm: direction error mean {:.4f}, p99 {:.4f}, max {:.4f} degrees; jump {:.5f} N, exact "
+      "{:.5f} "
+      "N\n",
+      20 * (1 << (2 * subdivisions)), 2e3 * sphere.amplitude, truth.mean, truth.p99, truth.largest, truth.jump,
+      truth.exact_jump);
+  EXPECT_EQ(truth.lost, 0U);
+  EXPECT_EQ(truth.flagged, 0U);
+  return truth;
+}
+
+TEST(ReliefTruth, displaced_sphere_on_a_coarse_base) {
+  const WavySphere sphere;
+  for (const auto& [subdivisions, texels] : {std::pair(3, 40), std::pair(4, 20)}) {
+    const Truth truth = report(sphere, subdivisions, texels);
+    EXPECT_LE(truth.mean, 0.3);
+    EXPECT_LE(truth.p99, 1.0);
+    EXPECT_LE(truth.largest, 3.0);
+    EXPECT_LE(truth.jump, 1.3 * truth.exact_jump);
+  }
+}
+
+}  // namespace
+}  // namespace asperity::test

@@ -1,0 +1,184 @@
+// Segments and nearest points of a relief against brute force: the displaced surface as a dense mesh.
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cstddef>
+#include <string>
+
+#include "tests/surface/reliefs.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+struct Searched {
+  std::string name;
+  std::shared_ptr<const ReliefSurface> surface;
+  Tessellation dense;
+};
+
+/// Open and closed, folded, stitched both ways, lowered, of high valence.
+const std::vector<Searched>& reliefs() {
+  static const std::vector<Searched> all = [] {
+    std::vector<Searched> made;
+    const auto add = [&](std::string name, MeshSource source, double amplitude, Mapping mapping, FoldMode folds,
+                         int cells) {
+      std::vector<std::shared_ptr<const Mesostructure>> maps = {tiled(wavy_map(amplitude, 16))};
+      if (mapping == Mapping::per_face) maps = unlike_maps(amplitude);
+      auto surface = relief_on(mesh_of(std::move(source)), std::move(maps),
+                               CoatSettings{mapping, Vec2::Ones(), {folds, Blend::quintic, 0.15, {}}});
+      Tessellation dense = tessellate(*surface, cells);
+      made.push_back({std::move(name), std::move(surface), std::move(dense)});
+    };
+    add("sphere", icosphere(1, 0.02), 5e-4, Mapping::triplanar, FoldMode::keep, 60);
+    add("patched sphere", icosphere(1, 0.02), 5e-4, Mapping::per_face, FoldMode::keep, 60);
+    add("rounded sphere", icosphere(1, 0.02), 5e-4, Mapping::per_face, FoldMode::round, 60);
+    add("lowered sphere", icosphere(0, 0.01), 0.02, Mapping::triplanar, FoldMode::keep, 100);
+    add("patched M_a", trial_mesh_a({4, 4, 0.01}), 5e-4, Mapping::per_face, FoldMode::keep, 60);
+    add("M_c", trial_mesh_c({3, 4, 0.01}), 4e-4, Mapping::triplanar, FoldMode::keep, 60);
+    add("cup", trial_mesh_e(3, std::numbers::pi / 2.0, 0.01), 5e-4, Mapping::triplanar, FoldMode::keep, 50);
+    add("cone", cone(24, 0.02, 0.008), 4e-4, Mapping::triplanar, FoldMode::keep, 60);
+    add("blob", random_closed_mesh(4, 1, 0.02, 0.4), 5e-4, Mapping::triplanar, FoldMode::keep, 60);
+    return made;
+  }();
+  return all;
+}
+
+TEST(ReliefSearch, the_dense_meshes_are_far_finer_than_the_relief) {
+  for (const Searched& one : reliefs())
+    EXPECT_LT(one.dense.error, 0.1 * one.surface->coat().amplitude_bound()) << one.name;
+}
+
+/// A point of the dense mesh, and a way off it.
+Vec3 random_near(Rng& rng, const TriangleMesh& mesh, double off) {
+  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_vector(rng, off);
+}
+
+TEST(ReliefSearch, the_nearest_point_is_as_near_as_the_dense_meshs_and_on_the_surface) {
+  Rng rng(70);
+  for (const Searched& one : reliefs()) {
+    Hint warm;
+    for (int i = 0; i < 400; ++i) {
+      const double off = std::pow(10.0, rng.uniform(-6.0, -2.0));
+      const Vec3 p = random_near(rng, one.dense.index.mesh(), off);
+      const double expected = one.dense.index.closest(p, infinity).distance;
+      Hint cold;
+      const Foot foot = one.surface->closest(p, infinity, i % 2 == 0 ? warm : cold);
+      ASSERT_TRUE(foot.found());
+      ASSERT_NEAR(foot.distance, expected, one.dense.error + 1e-3 * expected)
+          << one.name << ", case " << i << " at " << p.transpose();
+      ASSERT_NEAR((p - foot.point).norm(), foot.distance, 1e-12);
+      const ReliefFrame frame = one.surface->frame(foot.element);
+      const ReliefPoint there = one.surface->point(frame, foot.barycentric[1], foot.barycentric[2]);
+      ASSERT_LT((there.position - foot.point).norm(), 1e-12) << one.name << ": it lies on the surface";
+      ASSERT_GE(foot.normal.dot(p - foot.point), 0.0) << one.name;
+      // A bound below the distance finds nothing, one above it the same.
+      ASSERT_FALSE(one.surface->closest(p, 0.9 * foot.distance - one.dense.error, cold).found()) << one.name;
+      const Foot bounded = one.surface->closest(p, 1.1 * foot.distance + 1e-9, cold);
+      ASSERT_TRUE(bounded.found()) << one.name << ", case " << i;
+      ASSERT_NEAR(bounded.distance, foot.distance, one.dense.error + 1e-3 * expected) << one.name << ", case " << i;
+    }
+  }
+}
+
+TEST(ReliefSearch, a_segment_meets_the_surface_where_the_dense_mesh_is_met) {
+  Rng rng(71);
+  for (const Searched& one : reliefs()) {
+    Hint hint;
+    int met = 0;
+    int apart = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const double length = std::pow(10.0, rng.uniform(-4.0, -1.5));
+      const Vec3 from = random_near(rng, one.dense.index.mesh(), 0.7 * length);
+      const Segment motion{from, from + length * random_direction(rng)};
+      const FirstHit oracle = one.dense.index.first_hit(motion);
+      const SweptHit hit = one.surface->segment(motion, 0.0, Sides::both, hint);
+      if (hit.hit) {
+        const Vec3 touched = motion.from + hit.t * (motion.to - motion.from);
+        ASSERT_LT((touched - hit.contact.point).norm(), one.surface->skin()) << one.name << ", segment " << i;
+        ASSERT_LT(one.dense.index.closest(touched, infinity).distance, one.dense.error + one.surface->skin())
+            << one.name << ", segment " << i;
+        ASSERT_LE(hit.contact.normal.dot(motion.to - motion.from), 0.0) << one.name << ", segment " << i;
+      }
+      if (oracle.face == no_index && !hit.hit) continue;
+      ++met;
+      const bool same =
+          oracle.face != no_index && hit.hit && std::abs(oracle.t - hit.t) * length < 20.0 * one.dense.error;
+      apart += same ? 0 : 1;
+    }
+    EXPECT_GT(met, 500) << one.name;
+    // Grazing ways, and ends closer to the surface than the dense mesh is.
+    EXPECT_LT(apart, met / 20) << one.name;
+  }
+}
+
+TEST(ReliefSearch, a_segment_that_clearly_crosses_a_closed_relief_is_never_missed) {
+  Rng rng(72);
+  for (const Searched& one : reliefs()) {
+    if (!one.dense.index.mesh().report().closed()) continue;
+    Hint hint;
+    const Box box = one.surface->bounds().grown(0.01);
+    int crossing = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const Vec3 from = box.lower + Vec3(rng.uniform(), rng.uniform(), rng.uniform()).cwiseProduct(box.extent());
+      const Vec3 to = box.lower + Vec3(rng.uniform(), rng.uniform(), rng.uniform()).cwiseProduct(box.extent());
+      const bool in = depth_inside(one.dense.index, from) > 2.0 * one.dense.error;
+      const bool out = depth_inside(one.dense.index, to) < -2.0 * one.dense.error;
+      if (!in || !out) continue;
+      ++crossing;
+      ASSERT_TRUE(one.surface->segment({from, to}, 0.0, Sides::both, hint).hit) << one.name << ", outwards, " << i;
+      ASSERT_TRUE(one.surface->segment({to, from}, 0.0, Sides::both, hint).hit) << one.name << ", inwards, " << i;
+      ASSERT_TRUE(one.surface->segment({to, from}, 0.0, Sides::front, hint).hit) << one.name << ", front, " << i;
+    }
+    EXPECT_GT(crossing, 5) << one.name;
+  }
+}
+
+TEST(ReliefSearch, hints_change_no_answer) {
+  Rng rng(73);
+  for (const Searched& one : reliefs()) {
+    Hint warm;
+    for (int i = 0; i < 300; ++i) {
+      const Vec3 from = random_near(rng, one.dense.index.mesh(), 2e-3);
+      const Segment motion{from, from + 5e-3 * random_direction(rng)};
+      Hint cold;
+      const SweptHit one_hit = one.surface->segment(motion, 0.0, Sides::both, warm);
+      const SweptHit other = one.surface->segment(motion, 0.0, Sides::both, cold);
+      ASSERT_EQ(one_hit.hit, other.hit) << one.name;
+      ASSERT_EQ(one_hit.t, other.t) << one.name;
+      ASSERT_EQ(one_hit.contact.element, other.contact.element) << one.name;
+    }
+  }
+}
+
+TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {
+  Rng rng(74);
+  for (const Searched& one : reliefs()) {
+    Hint hint;
+    int stopped = 0;
+    for (int i = 0; i < 60; ++i) {
+      const double radius = rng.uniform(2e-4, 2e-3);
+      const Vec3 from = random_near(rng, one.dense.index.mesh(), 8e-3);
+      if (one.dense.index.closest(from, infinity).distance < radius + 2.0 * one.dense.error) continue;
+      const Segment motion{from, from + 5e-3 * random_direction(rng)};
+      const SweptHit hit = one.surface->segment(motion, radius, Sides::both, hint);
+      const double end = hit.hit ? hit.t : 1.0;
+      for (int k = 0; k <= 50; ++k) {
+        const Vec3 at = motion.from + (end * k / 50.0) * (motion.to - motion.from);
+        ASSERT_GT(one.dense.index.closest(at, infinity).distance, 0.9 * radius - one.dense.error)
+            << one.name << ", case " << i;
+      }
+      if (!hit.hit) continue;
+      ++stopped;
+      const Vec3 at = motion.from + hit.t * (motion.to - motion.from);
+      ASSERT_NEAR(one.dense.index.closest(at, infinity).distance, radius, 0.02 * radius + one.dense.error)
+          << one.name << ", case " << i;
+    }
+    EXPECT_GT(stopped, 3) << one.name;
+  }
+}
+
+}  // namespace
+}  // namespace asperity
