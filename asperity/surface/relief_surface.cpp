@@ -482,7 +482,8 @@ HeightJet ReliefSurface::rounded(const ReliefFrame& frame, double u, double v) c
   }
   const double rise = std::max(0.1, sample.gradient.dot(direction));
   // Over folds too sharp to be rounded the root may run away: no farther than `range` says.
-  at.height = std::clamp(at.height, coat_.lowest() - fold_depth_, coat_.highest() + fold_depth_);
+  at.height =
+      std::clamp(at.height, std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_);
   jet.height = at.height;
   jet.u = -sample.gradient.dot(frame.prism.edge_u + at.height * frame.prism.turn_u) / rise;
   jet.v = -sample.gradient.dot(frame.prism.edge_v + at.height * frame.prism.turn_v) / rise;
@@ -508,6 +509,7 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
     all.lowest = std::min(all.lowest, other.lowest);
     all.highest = std::max(all.highest, other.highest);
   };
+  bool rounds = false;
   if (frame.stitched) {
     const TriangleMesh& mesh = base_.mesh();
     const Vec2 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -556,10 +558,7 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
         in_edge = true;
       }
     }
-    if (in_edge && fold_depth_ > 0.0) {
-      all.lowest -= fold_depth_;
-      all.highest += fold_depth_;
-    }
+    rounds = in_edge && coat_.settings().stitching.folds == FoldMode::round;
   }
   if (frame.lowered) {
     double least = infinity;
@@ -570,6 +569,10 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
       most = std::max(most, share);
     }
     all = {std::min(all.lowest * least, all.lowest * most), std::max(all.highest * least, all.highest * most)};
+  }
+  // The root of a rounded fold may lie anywhere that `rounded` lets it.
+  if (rounds) {
+    include({std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_});
   }
   return all;
 }
