@@ -8,8 +8,8 @@ namespace asperity {
 namespace {
 
 // A step below these shares of the relief's grain and of the mean edge is not worth making, once one has been made.
-constexpr double rest_of_grain = 1e-4;
-constexpr double rest_of_edge = 1e-6;
+constexpr double rest_of_grain = 5e-4;
+constexpr double rest_of_edge = 5e-6;
 // The first one always is, unless the probe has not moved at all.
 constexpr double first_rest_of_grain = 1e-10;
 // Distance (in grains) between places where the way is checked.
