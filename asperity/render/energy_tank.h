@@ -11,8 +11,8 @@ namespace asperity {
 /// not hold is not rendered.
 class EnergyTank {
  public:
-  static constexpr double capacity =
-      5e-3;  ///< J: more than any single contact's spring holds at 10 N and 1 N/mm is not hoarded
+  /// J: what a spring of 1 N/mm holds when it is stretched by about 3 mm.
+  static constexpr double capacity = 5e-3;
 
   [[nodiscard]] double level() const noexcept { return level_; }  ///< J
   /// Takes in dissipated energy (J); what exceeds the capacity is lost. [servo]
