@@ -8,28 +8,11 @@ namespace asperity {
 
 namespace {
 
-// The skin is large against double rounding of the coordinates and small against any feature of the mesh.
-constexpr double skin_of_mean_edge = 1e-6;
-constexpr double least_skin_of_size = 1e-9;
-// A motion is blocked when it would come nearer than the first, and ends at the second. Between the two a probe slides
-// freely, so that rounding never holds it where it rests.
-constexpr double blocked_in_skins = 0.5;
-constexpr double stopped_in_skins = 0.75;
-// Either distance counts as reached within this share of a skin.
-constexpr double reached_in_skins = 0.0025;
-constexpr int newton_limit = 32;
-// Two contacts whose normals differ by less than this angle (rad) are one plane: their common line is undefined.
-constexpr double same_plane_cosine = 1.0 - 1e-10;
 // Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
 constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
-// A ball that moves by less than this share of its radius between two places where nothing reaches into it cannot have
-// passed anything: on the way a triangle comes nearer than at both ends by at most an eighth of length^2 / radius.
-constexpr double glide_of_radius = 0.25;
-// A ball resting within this many skins of a triangle touches it.
-constexpr double touch_in_skins = 2.0;
 std::uint64_t next_identity() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
@@ -67,11 +50,7 @@ TriangleIndex TriangleIndex::build(TriangleMesh mesh, SearchStructure structure,
   TriangleIndex index;
   index.mesh_ = std::make_unique<const TriangleMesh>(std::move(mesh));
   index.identity_ = next_identity();
-  index.skin_ =
-      std::max(skin_of_mean_edge * index.mesh_->mean_edge(), least_skin_of_size * index.mesh_->bounds().diagonal());
-  const Box& bounds = index.mesh_->bounds();
-  const double size = bounds.diagonal() + bounds.lower.cwiseAbs().cwiseMax(bounds.upper.cwiseAbs()).norm();
-  index.rounding_ = 64.0 * std::numeric_limits<double>::epsilon() * size;
+  index.tolerance_ = ContactTolerance::of(index.mesh_->mean_edge(), index.mesh_->bounds());
   if (structure == SearchStructure::bvh) {
     index.structure_ = std::make_unique<const std::variant<Bvh, TriangleOctree>>(Bvh::build(*index.mesh_, settings));
   } else {
@@ -89,25 +68,10 @@ FirstHit TriangleIndex::first_hit(const Segment& segment) const noexcept {
   return std::visit([&](const auto& structure) { return structure.first_hit(segment); }, *structure_);
 }
 
-Foot TriangleIndex::surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p,
-                                 const Vec3& face_normal) const noexcept {
-  Foot answer;
-  answer.point = point.point;
-  answer.distance = std::sqrt(point.squared_distance);
-  answer.element = face;
-  answer.barycentric = point.barycentric;
-  const Vec3 offset = p - point.point;
-  const double side = offset.dot(face_normal) < 0.0 ? -1.0 : 1.0;
-  answer.normal = side * face_normal;
-  if (point.barycentric.minCoeff() > 0.0 || answer.distance <= rounding_) return answer;
-  // The direction of a short offset is rounding; where it agrees with the face within that rounding, it is the face's.
-  if ((offset - answer.distance * answer.normal).norm() > rounding_) answer.normal = offset / answer.distance;
-  return answer;
-}
-
 Foot TriangleIndex::closest(const Vec3& p, double bound) const noexcept {
   const ClosestHit hit = std::visit([&](const auto& structure) { return structure.closest(p, bound); }, *structure_);
-  return hit.face == no_index ? Foot{} : surface_foot(hit.face, hit.point, p, mesh_->face_normal(hit.face));
+  return hit.face == no_index ? Foot{}
+                              : triangle_foot(hit.face, hit.point, p, mesh_->face_normal(hit.face), tolerance_);
 }
 
 Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept {
@@ -141,7 +105,7 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
   }
   if (best_face == no_index) return {};
   patch.last_face = best_face;
-  return surface_foot(best_face, best, p, mesh_->face_normal(best_face));
+  return triangle_foot(best_face, best, p, mesh_->face_normal(best_face), tolerance_);
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
@@ -161,35 +125,7 @@ bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& pa
 void TriangleIndex::sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides,
                                SweptHit& best) const noexcept {
   const auto [a, b, c] = mesh_->corners(face);
-  const Vec3 direction = motion.to - motion.from;
-  const Vec3 cross = (b - a).cross(c - a);
-  if (sides == Sides::front && cross.dot(motion.from - a) < 0.0) return;
-  const double blocked = radius + (blocked_in_skins + reached_in_skins) * skin_;
-  const double stopped = radius + (stopped_in_skins + reached_in_skins) * skin_;
-  double t = 0.0;
-  double t_stop = -1.0;
-  TrianglePoint at_stop;
-  for (int i = 0; i < newton_limit; ++i) {
-    const Vec3 x = motion.from + t * direction;
-    const TrianglePoint at = closest_point_on_triangle(x, a, b, c);
-    const double distance = std::sqrt(at.squared_distance);
-    // Exactly on a sheet its side is not decided yet: the motion away from it decides.
-    if (distance == 0.0 && (sides == Sides::both || cross.dot(direction) >= 0.0)) return;
-    // d(distance)/dt: the distance is convex along the motion, so the tangent never overshoots its first root.
-    const double slope = distance > 0.0 ? (x - at.point).dot(direction) / distance : -1.0;
-    if (slope >= 0.0) return;
-    if (t_stop < 0.0 && distance <= stopped) {
-      t_stop = t;
-      at_stop = at;
-    }
-    if (distance <= blocked) break;
-    const double next = radius + (t_stop < 0.0 ? stopped_in_skins : blocked_in_skins) * skin_;
-    t += (distance - next) / -slope;
-    if (t >= best.t) return;
-  }
-  best.hit = true;
-  best.t = std::max(t_stop, 0.0);
-  best.contact = surface_foot(face, at_stop, motion.from + best.t * direction, cross.normalized());
+  sweep_triangle(face, a, b, c, motion, radius, sides, tolerance_, best);
 }
 
 template <class Visit>
@@ -219,7 +155,7 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
 bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, double touch,
                               TrianglePatch& patch) const noexcept {
   const double margin = error(end);
-  const double blocked = radius + blocked_in_skins * skin_;
+  const double blocked = radius + blocked_in_skins * tolerance_.skin;
   ContactSet contacts;
   bool free = true;
   scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
@@ -249,8 +185,8 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
                                    TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
   const double length = direction.norm();
-  const double grown = radius + stopped_in_skins * skin_;
-  const double blocked = radius + blocked_in_skins * skin_;
+  const double grown = radius + stopped_in_skins * tolerance_.skin;
+  const double blocked = radius + blocked_in_skins * tolerance_.skin;
   SweptHit best;
   if (length == 0.0) return best;
   if (length > long_motion_in_edges * mesh_->mean_edge()) {
@@ -264,7 +200,7 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
         *structure_);
     return best;
   }
-  const double touch = radius + touch_in_skins * skin_;
+  const double touch = radius + touch_in_skins * tolerance_.skin;
   if (length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) return best;
   const double margin = error(motion.from);
   const auto resting_on = [&](std::uint32_t face) {
@@ -298,43 +234,12 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
 void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
                                 ContactSet& out) const noexcept {
   const auto [a, b, c] = mesh_->corners(face);
-  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
-  if (point.squared_distance > reach * reach) return;
-  const Vec3 cross = (b - a).cross(c - a);
-  if (sides == Sides::front && cross.dot(position - a) < 0.0) return;
-  const Foot contact = surface_foot(face, point, position, cross.normalized());
-  for (Foot& other : out) {
-    if (contact.normal.dot(other.normal) < same_plane_cosine) continue;
-    if (contact.distance < other.distance) other = contact;
-    return;
-  }
-  out.push_back(contact);
+  add_triangle_contact(face, a, b, c, position, reach, sides, tolerance_, out);
 }
 
-// A ball over a face also comes near the edges of its neighbours. The face's own plane keeps it off those edges; taken
-// as planes of their own, which lean back towards the ball, they would hold it at every edge it wants to slide across.
 void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {
-  const auto inside_face = [](const Foot& foot) { return foot.barycentric.minCoeff() > 0.0; };
-  for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
-    Foot& edge = contacts[i];
-    if (inside_face(edge)) continue;
-    const Foot* guard = nullptr;
-    for (const Foot& face : contacts) {
-      if (inside_face(face) && face.normal.dot(edge.point - face.point) <= rounding_) guard = &face;
-    }
-    if (guard == nullptr) continue;
-    double highest = -infinity;
-    for (const Vec3& corner : mesh_->corners(edge.element))
-      highest = std::max(highest, guard->normal.dot(corner - guard->point));
-    if (highest <= rounding_) {
-      // Convex: the whole neighbour lies below the face's plane.
-      contacts.swap_remove(i);
-    } else {
-      // Concave: what stops the slide is the neighbour's own plane.
-      const Vec3 normal = mesh_->face_normal(edge.element);
-      edge.normal = normal.dot(position - edge.point) < 0.0 ? Vec3(-normal) : normal;
-    }
-  }
+  settle_edge_contacts(
+      position, tolerance_, [&](std::uint32_t face) { return mesh_->corners(face); }, contacts);
 }
 
 void TriangleIndex::remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
@@ -355,7 +260,7 @@ void TriangleIndex::contacts(const Vec3& position, double radius, Sides sides, T
     for (const Foot& contact : patch.rest_contacts) out.push_back(contact);
     return;
   }
-  const double reach = radius + touch_in_skins * skin_;
+  const double reach = radius + touch_in_skins * tolerance_.skin;
   const double margin = error(position);
   scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (distance <= reach + margin) add_contact(face, position, reach, sides, out);

@@ -6,6 +6,7 @@
 #include "asperity/geometry/bvh.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/octree.h"
+#include "asperity/geometry/triangle_contact.h"
 #include "asperity/geometry/triangle_patch.h"
 
 namespace asperity {
@@ -31,7 +32,7 @@ class TriangleIndex {
   /// Identity that tells patches of different indices apart; never 0.
   [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
   /// Thickness that separates a resting probe from the surface (m).
-  [[nodiscard]] double skin() const noexcept { return skin_; }
+  [[nodiscard]] double skin() const noexcept { return tolerance_.skin; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
   /// Nearest point of the surface within `bound` (m); found() is false when there is none. [servo]
@@ -88,8 +89,6 @@ class TriangleIndex {
   void settle_edges(const Vec3& position, ContactSet& contacts) const noexcept;
   void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
                 TrianglePatch& patch) const noexcept;
-  [[nodiscard]] Foot surface_foot(std::uint32_t face, const TrianglePoint& point, const Vec3& p,
-                                  const Vec3& face_normal) const noexcept;
   void sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides, SweptHit& best) const noexcept;
   void add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides, ContactSet& out) const noexcept;
 
@@ -97,8 +96,7 @@ class TriangleIndex {
   std::unique_ptr<const TriangleMesh> mesh_;
   std::unique_ptr<const std::variant<Bvh, TriangleOctree>> structure_;
   std::uint64_t identity_ = 0;
-  double skin_ = 0.0;
-  double rounding_ = 0.0;  ///< of a coordinate, with room (m)
+  ContactTolerance tolerance_;
 };
 
 }  // namespace asperity

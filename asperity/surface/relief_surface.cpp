@@ -153,107 +153,111 @@ std::string ReliefReport::advice() const {
   return text + "; a base mesh that follows the shape more finely takes higher reliefs";
 }
 
-ReliefSurface::ReliefSurface(MeshSurface base, Coat coat)
-    : base_(std::move(base)), coat_(std::move(coat)), shell_(Shell::build(base_.mesh())) {
-  // A cure always exists, so there is no error to lose.
-  static_cast<void>(fit(ReliefSettings{}));
+ReliefSurface::ReliefSurface(MeshSurface base, Coat coat) : base_(std::move(base)), coat_(std::move(coat)) {
+  fit(ShellDirections::least_squares);
 }
 
 Result<ReliefSurface> ReliefSurface::build(MeshSurface base, Coat coat, const ReliefSettings& settings) {
-  if (settings.directions == ShellDirections::least_squares && settings.on_overlap == OnOverlap::cure)
-    return ReliefSurface(std::move(base), std::move(coat));
   ReliefSurface relief(std::move(base), std::move(coat));
   if (settings.on_overlap == OnOverlap::refuse && !relief.report_.fits()) {
+    // Nothing is rendered, so nothing was lowered.
     relief.report_.lowered_vertices = 0;
     return overlap_error(relief.report_.advice());
   }
-  if (settings.directions == ShellDirections::relaxed && !relief.report_.directions_relaxed) {
-    relief.shell_ = Shell::build(relief.base_.mesh(), ShellDirections::relaxed);
-    relief.shares_.clear();
-    relief.bands_.clear();
-    ASPERITY_TRY(const bool fitted, relief.fit(settings));
-    static_cast<void>(fitted);
-  }
+  if (settings.directions == ShellDirections::relaxed && !relief.report_.directions_relaxed)
+    relief.fit(ShellDirections::relaxed);
   return relief;
 }
 
-Result<bool> ReliefSurface::fit(const ReliefSettings& settings) {
-  const TriangleMesh& mesh = base_.mesh();
-  const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
+void ReliefSurface::lay_bands() {
   const Stitching& stitching = coat_.settings().stitching;
-  report_ = {};
-  report_.directions_relaxed = settings.directions == ShellDirections::relaxed;
-  const auto shares_of_faces = [&] {
-    bands_.clear();
-    // Folds are rounded whether heights differ over them or not.
-    const bool joined = coat_.has_seams() || stitching.folds == FoldMode::round;
-    if (joined && stitching.blend != Blend::none) bands_ = stitch_bands(mesh, shell_, stitching.rho);
-    const bool grown = !bands_.empty() && stitching.folds == FoldMode::round;
-    std::vector<double> share(faces, 1.0);
-    const double margin = grown ? 2.0 * stitching.rho : 0.0;
-    const double most = 2.0 * coat_.amplitude_bound() + 1e-12;
-    for (std::uint32_t face = 0; face < faces; ++face) {
-      const ShellInterval room = shell_.prism(mesh, face).injective(margin, most);
-      // Nearly every prism has room for all that the coat holds anywhere.
-      if (room.upper > room.lower && room.upper >= coat_.highest() && room.lower <= coat_.lowest()) continue;
-      const HeightRange heights = range(frame(face), whole_triangle);
-      if (room.upper > 0.0 && heights.highest > room.upper) share[face] = room.upper / heights.highest;
-      if (room.lower < 0.0 && heights.lowest < room.lower)
-        share[face] = std::min(share[face], room.lower / heights.lowest);
-      if (!(room.upper > room.lower)) share[face] = 0.0;
+  bands_.clear();
+  // Folds are rounded whether heights differ over them or not.
+  const bool joined = coat_.has_seams() || stitching.folds == FoldMode::round;
+  if (joined && stitching.blend != Blend::none) bands_ = stitch_bands(base_.mesh(), shell_, stitching.rho);
+}
+
+std::vector<double> ReliefSurface::fitting_shares() const {
+  const TriangleMesh& mesh = base_.mesh();
+  const Stitching& stitching = coat_.settings().stitching;
+  std::vector<double> share(mesh.triangles().size(), 1.0);
+  const double margin = !bands_.empty() && stitching.folds == FoldMode::round ? 2.0 * stitching.rho : 0.0;
+  const double most = 2.0 * coat_.amplitude_bound() + 1e-12;
+  for (std::uint32_t face = 0; face < share.size(); ++face) {
+    const ShellInterval room = shell_.prism(mesh, face).injective(margin, most);
+    // Nearly every prism has room for all that the coat holds anywhere.
+    if (room.upper > room.lower && room.upper >= coat_.highest() && room.lower <= coat_.lowest()) continue;
+    const HeightRange heights = range(frame(face), whole_triangle);
+    if (room.upper > 0.0 && heights.highest > room.upper) share[face] = room.upper / heights.highest;
+    if (room.lower < 0.0 && heights.lowest < room.lower)
+      share[face] = std::min(share[face], room.lower / heights.lowest);
+    if (!(room.upper > room.lower)) share[face] = 0.0;
+  }
+  return share;
+}
+
+double ReliefSurface::deepest_fold() const {
+  const TriangleMesh& mesh = base_.mesh();
+  double depth = 0.0;
+  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
+    const auto corners = mesh.corners(face);
+    const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+    for (int edge = 0; edge < 3; ++edge) {
+      const auto k = static_cast<std::size_t>(edge);
+      const std::uint32_t other = mesh.neighbour(face, edge);
+      if (other == no_index) continue;
+      // Within a band of half width w the other plane runs off by at most w times the tangent of the fold; folds
+      // sharper than 70 degrees are rounded no deeper than those.
+      const double cosine = std::max(0.3, mesh.face_normal(face).dot(mesh.face_normal(other)));
+      const double slope = std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
+      const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
+      depth = std::max(depth, 4.0 * static_cast<double>(bands_[face].rho[(k + 2) % 3]) * height * slope);
     }
-    return share;
-  };
-  const auto worst = [](const std::vector<double>& share) {
-    double sum = 0.0;
-    for (const double one : share) sum += 1.0 - one;
-    return sum;
-  };
-  std::vector<double> share = shares_of_faces();
-  for (std::uint32_t face = 0; face < faces; ++face) {
+  }
+  return depth;
+}
+
+void ReliefSurface::fit(ShellDirections directions) {
+  const TriangleMesh& mesh = base_.mesh();
+  report_ = {};
+  shares_.clear();
+  overlapped_.clear();
+  fold_depth_ = 0.0;
+  shell_ = Shell::build(mesh, directions);
+  lay_bands();
+  report_.directions_relaxed = directions == ShellDirections::relaxed;
+  report_.blind_vertices = shell_.blind_vertices;
+  std::vector<double> share = fitting_shares();
+  for (std::uint32_t face = 0; face < share.size(); ++face) {
     if (share[face] < 1.0) report_.faces_at_fault.push_back(face);
     report_.fitting_share = std::min(report_.fitting_share, share[face]);
   }
-  report_.blind_vertices = shell_.blind_vertices;
+  const auto missing = [](const std::vector<double>& shares) {
+    double sum = 0.0;
+    for (const double one : shares) sum += 1.0 - one;
+    return sum;
+  };
   if (!report_.faces_at_fault.empty() && !report_.directions_relaxed) {
     Shell before = std::move(shell_);
     shell_ = Shell::build(mesh, ShellDirections::relaxed);
-    std::vector<double> relaxed = shares_of_faces();
-    if (worst(relaxed) < 0.9 * worst(share)) {
-      report_.directions_relaxed = true;
+    lay_bands();
+    std::vector<double> relaxed = fitting_shares();
+    report_.directions_relaxed = missing(relaxed) < 0.9 * missing(share);
+    if (report_.directions_relaxed) {
       share = std::move(relaxed);
     } else {
       shell_ = std::move(before);
-      static_cast<void>(shares_of_faces());
+      lay_bands();
     }
   }
-  if (worst(share) > 0.0) lower(share);
+  if (missing(share) > 0.0) lower(share);
   double longest = 0.0;
   for (const Vec3f& direction : shell_.directions) longest = std::max(longest, static_cast<double>(direction.norm()));
-  const bool rounds = !bands_.empty() && stitching.folds == FoldMode::round;
-  if (rounds) {
-    // Within a band of half width w the other plane runs off by at most w times the tangent of the fold; folds sharper
-    // than 70 degrees are rounded no deeper than those.
-    for (std::uint32_t face = 0; face < faces; ++face) {
-      const auto corners = mesh.corners(face);
-      const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
-      for (int edge = 0; edge < 3; ++edge) {
-        const auto k = static_cast<std::size_t>(edge);
-        const std::uint32_t other = mesh.neighbour(face, edge);
-        if (other == no_index) continue;
-        const double cosine = std::max(0.3, mesh.face_normal(face).dot(mesh.face_normal(other)));
-        const double slope = std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
-        const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
-        const double width = static_cast<double>(bands_[face].rho[(k + 2) % 3]) * height;
-        fold_depth_ = std::max(fold_depth_, 4.0 * width * slope);
-      }
-    }
-  }
+  if (coat_.settings().stitching.folds == FoldMode::round) fold_depth_ = deepest_fold();
   reach_ = longest * (coat_.amplitude_bound() + fold_depth_);
   grain_ = std::min(coat_.texel_size(), mesh.mean_edge());
   skin_ = std::min(base_.skin(), 1e-3 * grain_);
   find_overlaps();
-  return true;
 }
 
 void ReliefSurface::lower(const std::vector<double>& share_of_face) {

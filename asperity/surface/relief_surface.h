@@ -103,7 +103,11 @@ class ReliefSurface {
   [[nodiscard]] SweptHit ball_segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
   template <class Skip>
   [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, Hint& hint, const Skip& skip) const noexcept;
-  Result<bool> fit(const ReliefSettings& settings);
+  void fit(ShellDirections directions);
+  void lay_bands();
+  /// Per face: of the heights over it, the share that its prism has room for.
+  [[nodiscard]] std::vector<double> fitting_shares() const;
+  [[nodiscard]] double deepest_fold() const;
   void lower(const std::vector<double>& share_of_face);
   void find_overlaps();
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
