@@ -19,28 +19,27 @@ void add_ratio(std::vector<Ratio>& ratios, const Group& group, const char* numer
   const RowResult* over = group.row(numerator);
   const RowResult* under = group.row(denominator);
   if (over == nullptr || under == nullptr || under->warm.p50 <= 0.0) return;
-  ratios.push_back({fmt::format("{} / {}, {} triangles", numerator, denominator, group.triangles),
-                    over->warm.p50 / under->warm.p50, bar, margin});
+  ratios.push_back({fmt::format("{} / {}, {}", numerator, denominator, group.size()), over->warm.p50 / under->warm.p50,
+                    bar, margin});
 }
 
-/// What a relief row costs on the base where it costs most, compared with the one where it costs least.
-void add_relief_ratios(std::vector<Ratio>& ratios, const std::vector<Group>& groups) {
-  const auto first =
-      std::find_if(groups.begin(), groups.end(), [](const Group& group) { return group.kind == "relief"; });
+/// What a row costs on the base, or in the volume, where it costs most, compared with the one where it costs least.
+void add_flatness(std::vector<Ratio>& ratios, const std::vector<Group>& groups, const char* kind, const char* of) {
+  const auto first = std::find_if(groups.begin(), groups.end(), [&](const Group& group) { return group.kind == kind; });
   if (first == groups.end()) return;
   for (const RowResult& row : first->rows) {
     double least = row.warm.p50;
     double most = row.warm.p50;
-    std::size_t bases = 0;
+    std::size_t sizes = 0;
     for (const Group& group : groups) {
-      const RowResult* same = group.kind == "relief" ? group.row(row.name) : nullptr;
+      const RowResult* same = group.kind == kind ? group.row(row.name) : nullptr;
       if (same == nullptr) continue;
-      ++bases;
+      ++sizes;
       least = std::min(least, same->warm.p50);
       most = std::max(most, same->warm.p50);
     }
-    if (least > 0.0 && bases > 2)
-      ratios.push_back({fmt::format("{}: dearest / cheapest base", row.name), most / least, 1.5, 15.0});
+    if (least > 0.0 && sizes > 2)
+      ratios.push_back({fmt::format("{}: dearest / cheapest {}", row.name, of), most / least, 1.5, 15.0});
   }
 }
 
@@ -62,6 +61,7 @@ Json json_of(const Group& group) {
   }
   return {{"kind", group.kind},
           {"triangles", group.triangles},
+          {"resolution", group.resolution},
           {"mesh_build_s", group.mesh_build_seconds},
           {"search_build_s", group.search_build_seconds},
           {"embree_build_s", group.embree_build_seconds},
@@ -72,9 +72,13 @@ Json json_of(const Group& group) {
 }
 
 std::string text_of(const Group& group) {
-  std::string text = fmt::format("\n{} of {} triangles: {:.1f} bytes a triangle", group.kind, group.triangles,
-                                 group.bytes_per_triangle);
-  if (group.coat_bytes > 0) {
+  std::string text = fmt::format("\n{} of {}: ", group.kind, group.size());
+  if (group.resolution == 0) text += fmt::format("{:.1f} bytes a triangle", group.bytes_per_triangle);
+  if (group.resolution > 0) {
+    text +=
+        fmt::format("{:.1f} MB; made in {:.3f} s, octree in {:.3f} s\n", static_cast<double>(group.coat_bytes) * 1e-6,
+                    group.mesh_build_seconds, group.search_build_seconds);
+  } else if (group.coat_bytes > 0) {
     text += fmt::format(", coat {:.1f} MB\n", static_cast<double>(group.coat_bytes) * 1e-6);
   } else {
     text += fmt::format(
@@ -94,6 +98,10 @@ std::string text_of(const Group& group) {
 
 }  // namespace
 
+std::string Group::size() const {
+  return resolution > 0 ? fmt::format("{0}^3 samples", resolution) : fmt::format("{} triangles", triangles);
+}
+
 std::vector<Ratio> Report::ratios() const {
   std::vector<Ratio> ratios;
   for (const Group& group : groups) {
@@ -103,7 +111,8 @@ std::vector<Ratio> Report::ratios() const {
     add_ratio(ratios, group, closest_coherent, embree_bounded, 0.0, 4.0);
     add_ratio(ratios, group, proxy_edge, proxy_inside, 2.0, 20.0);
   }
-  add_relief_ratios(ratios, groups);
+  add_flatness(ratios, groups, "relief", "base");
+  add_flatness(ratios, groups, "volume", "volume");
   return ratios;
 }
 
@@ -112,10 +121,10 @@ std::vector<std::string> Report::failures() const {
   for (const Group& group : groups) {
     for (const RowResult& row : group.rows) {
       if (row.warm.updates == 0 || row.cold.updates == 0)
-        failures.push_back(fmt::format("{} on {} triangles did not run", row.name, group.triangles));
+        failures.push_back(fmt::format("{} on {} did not run", row.name, group.size()));
       if (row.answered_share < 0.99) {
-        failures.push_back(fmt::format("{} on {} triangles answered only {:.1f} % of its updates", row.name,
-                                       group.triangles, 100.0 * row.answered_share));
+        failures.push_back(fmt::format("{} on {} answered only {:.1f} % of its updates", row.name, group.size(),
+                                       100.0 * row.answered_share));
       }
     }
     // Embree holds vertices in single precision and its culling ball with them; the distances are in double.
@@ -133,7 +142,7 @@ std::vector<std::string> Report::failures() const {
 
 std::string Report::text() const {
   std::string text = fmt::format(
-      "{}\n{}, {}\nProbe 1 mm under an icosphere of radius 50 mm, 50 mm/s, 1 kHz. Cold: 64 MB swept before every "
+      "{}\n{}, {}\nProbe 1 mm under a sphere of radius 50 mm, 50 mm/s, 1 kHz. Cold: 64 MB swept before every "
       "update.\n"
       "One reading of the clock costs {:.0f} ns, which is taken off.\n",
       command, machine, date, clock_cost);

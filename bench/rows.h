@@ -25,8 +25,9 @@ inline constexpr const char* proxy_edge = "proxy, per face, along an edge";
 
 /// What was measured on one mesh.
 struct Group {
-  std::string kind;  ///< "mesh" or "relief"
+  std::string kind;  ///< "mesh", "relief" or "volume"
   std::size_t triangles = 0;
+  std::uint32_t resolution = 0;       ///< of a volume: samples along each axis
   double mesh_build_seconds = 0.0;    ///< welding, checks, adjacency, normals
   double search_build_seconds = 0.0;  ///< our hierarchy
   double embree_build_seconds = 0.0;  ///< 0 where Embree takes no part
@@ -35,6 +36,8 @@ struct Group {
   double largest_disagreement = 0.0;  ///< m, between our distance and Embree's over the whole slide
   std::vector<RowResult> rows;
 
+  /// "1280 triangles", "128^3 samples".
+  [[nodiscard]] std::string size() const;
   /// The row of that name, or nullptr.
   [[nodiscard]] const RowResult* row(const std::string& name) const;
 };
@@ -46,5 +49,9 @@ Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_
 /// test (0.30 mm from trough to crest, 4.9 mm long) and H_1 with its walls; proxy law with friction 0.3 / 0.2, and the
 /// consistent forms of Algorithms 1 and 2. On the two coarsest meshes also near an edge against inside a face. [build]
 Result<Group> measure_relief(int subdivisions, int map_size, const Effort& effort, double clock_cost);
+
+/// A sphere of 50 mm, slightly wavy, as the isosurface of count^3 samples over a cube of 120 mm: the proxy law with
+/// friction 0.3 / 0.2, cross-uncross and avila, and the search for a crossing alone. [build]
+Result<Group> measure_volume(std::uint32_t count, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

@@ -26,6 +26,7 @@ struct CompareOptions {
 };
 
 std::vector<std::string> default_laws(const Scene& scene) {
+  if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
   for (const Instance& instance : scene.instances()) {
     if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
   }
@@ -65,16 +66,56 @@ std::string number(double value, const char* format) {
 
 void print_table(const Experiment& experiment, const std::vector<Column>& columns) {
   std::cout << fmt::format("scene {}: {}\n", experiment.name, setup_facts(experiment).back().value);
-  std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", "law", "direction", "height", "jump",
-                           "energy/loop", "update p50");
+  const bool follows = followed_instance(experiment.scene) != nullptr;
+  std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}{}\n", "law", "direction", "height", "jump",
+                           "energy/loop", "update p50", follows ? fmt::format("{:>12}{:>12}", "follow", "max") : "");
   for (const Column& column : columns) {
     const RunMetrics& m = column.entry.metrics;
     constexpr double degrees = 57.29577951308232;
+    const auto share = [](double value) { return number(value * 100.0, "{:.3g} %"); };
     std::cout << fmt::format(
-        "{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}\n", column.entry.law, number(m.direction.mean * degrees, "{:.2f} deg"),
+        "{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}{}\n", column.entry.law, number(m.direction.mean * degrees, "{:.2f} deg"),
         number(m.height.relative_error * 100.0, "{:.2f} %"), number(m.force.largest_jump, "{:.3g} N"),
-        number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"), format_seconds(m.update.p50));
+        number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"), format_seconds(m.update.p50),
+        follows ? fmt::format("{:>12}{:>12}", share(m.follow.global), share(m.follow.max)) : "");
   }
+}
+
+/// Who notices layers as thin as the paper's, and as M1's own on the scene.
+Result<std::vector<DetectionRow>> detect_layers(const Experiment& experiment) {
+  const Instance* instance = followed_instance(experiment.scene);
+  if (instance == nullptr) return std::vector<DetectionRow>{};
+  DetectionSettings settings;
+  settings.thicknesses = {0.05e-3, AvilaLaw{}.largest_force / instance->material.stiffness};
+  settings.speeds = {0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0};
+  settings.rate = experiment.rate;
+  settings.passages = 300;
+  return detection_table(settings);
+}
+
+void print_detection(const std::vector<DetectionRow>& rows) {
+  if (rows.empty()) return;
+  std::cout << fmt::format("{:>12}{:>12}{:>12}{:>12}{:>16}{:>12}\n", "layer", "speed", "expected", "avila",
+                           "cross-uncross", "proxy");
+  for (const DetectionRow& row : rows) {
+    const auto share = [](double value) { return number(value * 100.0, "{:.0f} %"); };
+    std::cout << fmt::format("{:>12}{:>12}{:>12}{:>12}{:>16}{:>12}\n", format_length(row.thickness),
+                             fmt::format("{:g} m/s", row.speed), share(row.expected), share(row.avila),
+                             share(row.cross_uncross), share(row.proxy));
+  }
+}
+
+Json detection_json(const std::vector<DetectionRow>& rows) {
+  Json list = Json::array();
+  for (const DetectionRow& row : rows) {
+    list.push_back({{"thickness", row.thickness},
+                    {"speed", row.speed},
+                    {"expected", row.expected},
+                    {"avila", row.avila},
+                    {"cross_uncross", row.cross_uncross},
+                    {"proxy", row.proxy}});
+  }
+  return list;
 }
 
 Result<int> compare(const CompareOptions& options, const Console& console) {
@@ -96,16 +137,19 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     ASPERITY_TRY(Column column, run_law(experiment, name, progress));
     columns.push_back(std::move(column));
   }
+  ASPERITY_TRY(const std::vector<DetectionRow> detection, detect_layers(experiment));
   Json document{{"program", program_name()},
                 {"command", console.command_line},
                 {"scene", experiment.name},
                 {"notes", experiment.notes}};
   for (const Column& column : columns) document["laws"].push_back(law_json_of(column));
+  if (!detection.empty()) document["detection"] = detection_json(detection);
   if (!options.no_report) {
     CompareReport report;
     report.origin = report_origin(experiment, console);
     report.setup = setup_facts(experiment);
     for (const Column& column : columns) report.entries.push_back(column.entry);
+    report.detection = detection;
     ASPERITY_TRY(report.picture,
                  render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
     ASPERITY_CHECK(write_compare_report(folder / "report.html", report));
@@ -119,6 +163,7 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     console.print(document);
   } else {
     print_table(experiment, columns);
+    print_detection(detection);
     std::cout << (options.no_report ? "numbers " + (folder / "compare.json").string()
                                     : "report  " + (folder / "report.html").string())
               << '\n';
@@ -144,7 +189,9 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
       "direction: mean angle between the force and the relief's normal. height: RMS of followed height against the "
       "true relief, of what was\n"
       "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "
-      "time of one tick.\n"
+      "time of one tick. follow, max: on an isosurface, the error of eq. 20 over the path and the largest of a tick.\n"
+      "On an isosurface a second table says which share of straight passages through a layer each law notices at the "
+      "scene's rate.\n"
       "Examples:\n"
       "  asperity compare M_a-H_3 --laws proxy,mesostructure,force-shading\n"
       "  asperity compare groove --laws mesostructure-literal,mesostructure\n"

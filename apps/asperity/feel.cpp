@@ -126,6 +126,9 @@ std::vector<std::string> feel_of(const Experiment& experiment, const Instance& i
     amplitude_line(coat, experiment, stiffness, lines);
     detail_lines(coat, experiment, lines);
     crest_line(coat, force, stiffness, lines);
+  } else if (const IsoSurface* iso = iso_of(instance.surface)) {
+    lines.push_back(fmt::format("the isosurface has no detail below its cells of {}",
+                                format_length(iso->field().narrowest_cell())));
   } else {
     lines.push_back("no coat: the shape alone is felt");
   }

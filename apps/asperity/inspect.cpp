@@ -11,10 +11,12 @@
 #include "apps/asperity/feel.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
+#include "asperity/field/brick_store.h"
 #include "asperity/field/image.h"
 #include "asperity/io/image_io.h"
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/trace_file.h"
+#include "asperity/io/volume_io.h"
 
 namespace asperity::program {
 namespace {
@@ -144,6 +146,71 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   return found;
 }
 
+void axis_facts(const GridAxes& axes, const char* unit, Findings& found) {
+  found.fact("size", fmt::format("{} x {} x {} samples", axes[0].size(), axes[1].size(), axes[2].size()));
+  for (std::size_t a = 0; a < 3; ++a) {
+    const GridAxis& axis = axes[a];
+    double widest = 0.0;
+    for (std::uint32_t i = 0; i < axis.cells(); ++i) widest = std::max(widest, axis.width(i));
+    const std::string cells = axis.is_uniform()
+                                  ? fmt::format("even, cells of {:.4g}", widest)
+                                  : fmt::format("stretched, cells of {:.4g} to {:.4g}", axis.narrowest(), widest);
+    found.fact(fmt::format("axis {}", "xyz"[a]),
+               fmt::format("{:.6g} to {:.6g} {}, {}", axis.front(), axis.back(), unit, cells));
+  }
+}
+
+void array_facts(const VolumeSource& source, Findings& found) {
+  for (const VolumeArray& array : source.arrays) {
+    found.fact(fmt::format("array \"{}\"", array.name),
+               fmt::format("{}{} on {}s, {:.6g} to {:.6g}{}",
+                           array.components > 1 ? fmt::format("{} times ", array.components) : "", array.type,
+                           to_string(array.association), array.lowest, array.highest,
+                           array.unknown > 0 ? fmt::format(", {} values are not numbers", array.unknown) : ""));
+  }
+}
+
+/// A volume whose samples are read, then what can be felt of it with the defaults.
+Result<Findings> inspect_volume(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(const VolumeSource source, read_volume(options.file, {}, progress));
+  Findings found{"volume", {}, {}, {}};
+  axis_facts(source.axes(), "of the file's unit", found);
+  array_facts(source, found);
+  found.fact("looked at", fmt::format("\"{}\"{}", source.array, source.cell_data ? ", in the cells' middles" : ""));
+  for (const std::string& note : source.notes) found.problems.push_back(note);
+  const auto* grid = std::get_if<ScalarGrid>(&source.data);
+  if (grid == nullptr) {
+    found.problems.push_back("it holds vectors: a scene chooses a component, or what to derive from them");
+    return found;
+  }
+  found.fact("range", fmt::format("{:.6g} to {:.6g}", grid->lowest(), grid->highest()));
+  if (!(grid->highest() > grid->lowest())) {
+    found.problems.push_back("every sample is equal: there is no surface in it");
+    return found;
+  }
+  found.fact("suggested threshold", fmt::format("{:.6g}", otsu_threshold(*grid)));
+  ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
+  for (const ReportFact& fact : scene.facts) {
+    if (fact.name.starts_with("surface") || fact.name == "device")
+      found.facts.push_back({"as a scene: " + fact.name, fact.value});
+  }
+  found.felt = scene.felt;
+  return found;
+}
+
+Result<Findings> inspect_bricks(const std::string& file) {
+  BrickSettings settings;
+  settings.stream = false;
+  ASPERITY_TRY(const std::unique_ptr<BrickStore> store, BrickStore::open(file, settings));
+  Findings found{"bricked volume", {}, {}, {}};
+  axis_facts(store->axes(0), "m", found);
+  found.fact("array", fmt::format("\"{}\", {}, {:.6g} to {:.6g}", store->name(), to_string(store->type()),
+                                  store->lowest(), store->highest()));
+  found.fact("levels", fmt::format("{}", store->levels()));
+  found.fact("file", fmt::format("{:.3f} MB", static_cast<double>(store->file_bytes()) * 1e-6));
+  return found;
+}
+
 bool looks_like_image(const std::string& file) {
   std::string extension = fs::path(file).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -154,6 +221,8 @@ bool looks_like_image(const std::string& file) {
 Result<Findings> inspect_any(InspectOptions options, const Progress& progress) {
   options.scene.scene = options.file;
   std::error_code ignored;
+  if (fs::exists(options.file, ignored) && is_bricked_path(options.file)) return inspect_bricks(options.file);
+  if (fs::exists(options.file, ignored) && is_volume_path(options.file)) return inspect_volume(options, progress);
   if (fs::is_regular_file(options.file, ignored)) {
     if (is_trace_file(options.file)) return inspect_trace(options.file);
     if (looks_like_image(options.file)) return inspect_image(options, progress);
@@ -194,9 +263,10 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
 
 CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
   CLI::App* command = app.add_subcommand(
-      "inspect", "Say what a mesh, map, scene or trace is, what is wrong with it, and what can be felt of it");
+      "inspect", "Say what a mesh, map, volume, scene or trace is, what is wrong with it, and what can be felt of it");
   auto options = std::make_shared<InspectOptions>();
-  command->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a scene, a built-in scene or a trace")
+  command
+      ->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a volume, a scene, a built-in scene or a trace")
       ->required();
   command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
   command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
@@ -209,6 +279,7 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
       "Examples:\n"
       "  asperity inspect bunny.obj\n"
       "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
+      "  asperity inspect kitchen.vtk\n"
       "  asperity inspect out/icosphere-relief/trace.asptrace --json");
   command->callback(
       [options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });

@@ -55,6 +55,7 @@ int run(int argc, char** argv) {
   add_compare(app, console, action);
   add_replay(app, console, action);
   add_inspect(app, console, action);
+  add_convert(app, console, action);
   add_scenes(app, console, action);
   add_bench(app, console, action);
   add_schema(app, console, action);

@@ -50,6 +50,9 @@ Result<Comparison> play(const Trace& trace, const Experiment& experiment, const 
   Comparison comparison;
   for (std::size_t i = 0; i < trace.records.size(); ++i) {
     const TraceRecord& record = trace.records[i];
+    // What was in memory then is what is felt now.
+    state.wanted_level = record.rendered.level;
+    ASPERITY_CHECK(fetch_volumes(experiment.scene, state, record.probe));
     const ForceSample rendered = step(experiment.scene, state, record.probe, record.dt);
     compare_tick(record, rendered, safety.apply(rendered, record.probe, record.dt).force, comparison);
     if (progress && i % 1000 == 0)

@@ -29,14 +29,20 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
   result.records.reserve(settings.expected_ticks);
   ProxyState state;
   Status written = success();
+  // Not in real time: what a tick needs of a volume larger than memory is waited for.
+  Status fetched = success();
   const auto keep = [&](const TraceRecord& tick) {
     result.records.push_back(tick);
     if (record) written = record(tick);
-    return written.ok();
+    return written.ok() && fetched.ok();
   };
-  const auto render = [&](const ProbeSample& sample, Seconds dt) { return step(experiment.scene, state, sample, dt); };
+  const auto render = [&](const ProbeSample& sample, Seconds dt) {
+    if (fetched.ok()) fetched = fetch_volumes(experiment.scene, state, sample);
+    return step(experiment.scene, state, sample, dt);
+  };
   result.summary = run_session(render, probe, safety, settings, keep, progress);
   ASPERITY_CHECK(std::move(written));
+  ASPERITY_CHECK(std::move(fetched));
   result.hash = force_hash(result.records);
   return result;
 }
@@ -61,7 +67,22 @@ std::string machine_line() {
                      system.machine);
 }
 
+/// "isosurface at 0.5 of 259 x 127 x 128 samples (smooth), 200 mm x 100 mm x 100 mm".
+std::string volume_fact(const IsoSurface& iso) {
+  const ScalarField& field = iso.field();
+  const GridAxes& axes = field.axes();
+  const Vec3 extent = field.bounds().extent();
+  std::string text =
+      fmt::format("isosurface at {:.5g} ({} inside) of {} x {} x {} samples ({}), {} x {} x {}", iso.threshold(),
+                  iso.inside() == Inside::low ? "low" : "high", axes[0].size(), axes[1].size(), axes[2].size(),
+                  field.reconstruction() == CellReconstruction::smooth ? "smooth" : "trilinear",
+                  format_length(extent.x()), format_length(extent.y()), format_length(extent.z()));
+  if (field.bricks() != nullptr) text += fmt::format(", in bricks of {} levels", field.levels());
+  return text;
+}
+
 std::string surface_fact(const Instance& instance) {
+  if (const IsoSurface* iso = iso_of(instance.surface)) return volume_fact(*iso);
   const TriangleMesh& mesh = base_mesh(instance.surface);
   const Vec3 extent = mesh.bounds().extent();
   std::string text = fmt::format("{} triangles, {} x {} x {}", mesh.report().triangles, format_length(extent.x()),
@@ -103,6 +124,9 @@ std::string law_names_of(const Scene& scene) {
     const std::string name = law_name(instance.law);
     if (names.find(name) == std::string::npos) names += (names.empty() ? "" : ", ") + name;
   }
+  for (const FieldEffect& effect : scene.effects()) {
+    names += (names.empty() ? "" : ", ") + std::string(field_effect_names()[static_cast<std::size_t>(effect.kind)]);
+  }
   return names;
 }
 
@@ -112,6 +136,10 @@ std::vector<ReportFact> setup_facts(const Experiment& experiment) {
     facts.push_back({fmt::format("surface \"{}\"", instance.name), surface_fact(instance)});
     facts.push_back({fmt::format("law, stiffness of \"{}\"", instance.name),
                      fmt::format("{}, {:.3g} N/mm", law_name(instance.law), instance.material.stiffness * 1e-3)});
+  }
+  for (const FieldEffect& effect : experiment.scene.effects()) {
+    facts.push_back({fmt::format("effect \"{}\"", effect.name),
+                     std::string(field_effect_names()[static_cast<std::size_t>(effect.kind)])});
   }
   facts.push_back({"device", fmt::format("{}: {:g} N, {:g} N/mm, {} steps", experiment.device.name,
                                          experiment.device.max_force, experiment.device.max_stiffness * 1e-3,

@@ -11,6 +11,7 @@
 
 #include "asperity/core/suggest.h"
 #include "asperity/io/trace_file.h"
+#include "asperity/io/volume_io.h"
 
 namespace asperity::program {
 namespace {
@@ -34,7 +35,9 @@ Error unknown_scene(const std::string& scene) {
                   near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
       scene,
       {},
-      fmt::format("a scene (.json), a mesh (.obj, .ply, .stl), or a built-in scene: {}", fmt::join(names, ", "))};
+      fmt::format(
+          "a scene (.json), a mesh (.obj, .ply, .stl), a volume (.vtk, .vti, .vtr, ...), or a built-in scene: {}",
+          fmt::join(names, ", "))};
 }
 
 /// The first byte that is no white space; 0 when there is none.
@@ -57,6 +60,13 @@ bool is_picture_file(const std::string& file) {
 
 std::string absolute(const std::string& path) {
   return fs::absolute(path).lexically_normal().string();
+}
+
+/// A scene with one surface, of the file.
+SceneText scene_of(const std::string& file, const char* kind) {
+  const Json made = {{"name", fs::path(file).stem().string()},
+                     {"surfaces", Json::array({Json{{kind, absolute(file)}}})}};
+  return SceneText{made.dump(2, ' ', false, Json::error_handler_t::replace), ".", file};
 }
 
 /// Puts `value` at `key` of `object` when it was given. What stands in the way is left for the reader to name.
@@ -137,7 +147,10 @@ void change_stroke(Json& scene, const SceneArgument& a, bool loops) {
 }  // namespace
 
 void add_scene_options(CLI::App& command, SceneArgument& a) {
-  command.add_option("SCENE", a.scene, "A scene file, a mesh (OBJ, PLY, STL), or a built-in scene (asperity scenes)")
+  command
+      .add_option("SCENE", a.scene,
+                  "A scene file, a mesh (OBJ, PLY, STL), a volume (VTK, OpenFOAM, NRRD, raw, .aspvol), or a built-in "
+                  "scene (asperity scenes)")
       ->capture_default_str();
   command.add_option("--relief", a.relief, "Height map (PNG, JPEG) to lay on every surface")->group("Relief");
   command.add_option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge")->group("Relief");
@@ -175,8 +188,9 @@ Result<SceneText> find_scene(const std::string& scene) {
     }
     return unknown_scene(scene);
   }
+  if (is_volume_path(scene)) return scene_of(scene, "volume");
   if (fs::is_directory(scene, ignored))
-    return Error{ErrorCode::file_missing, "is a folder", scene, {}, "a scene, a mesh, or a built-in scene"};
+    return Error{ErrorCode::file_missing, "is a folder", scene, {}, "a scene, a mesh, a volume, or a built-in scene"};
   if (is_trace_file(scene))
     return Error{
         ErrorCode::file_unsupported, "is a trace", scene, {}, "a scene or a mesh (asperity replay plays traces)"};
@@ -187,11 +201,7 @@ Result<SceneText> find_scene(const std::string& scene) {
                  {},
                  "a scene or a mesh (--relief FILE lays a picture on it)"};
   }
-  if (!is_scene_file(scene)) {
-    const Json made = {{"name", fs::path(scene).stem().string()},
-                       {"surfaces", Json::array({Json{{"mesh", absolute(scene)}}})}};
-    return SceneText{made.dump(2, ' ', false, Json::error_handler_t::replace), ".", scene};
-  }
+  if (!is_scene_file(scene)) return scene_of(scene, "mesh");
   std::ifstream stream(scene, std::ios::binary);
   if (!stream) return Error{ErrorCode::file_missing, "cannot be read", scene, {}, "a readable file"};
   std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};

@@ -1,5 +1,6 @@
 #pragma once
-// What a command is pointed at: a scene file, a built-in scene, or a mesh alone; and the options that change it.
+// What a command is pointed at: a scene file, a built-in scene, or a mesh or volume alone; and the options that change
+// it.
 
 #include <CLI/CLI.hpp>
 #include <optional>
@@ -27,8 +28,8 @@ void add_scene_options(CLI::App& command, SceneArgument& argument);
 /// `loops`: let an open stroke go there and back, so that energy over closed loops can be told. [main]
 Result<Experiment> load_scene(const SceneArgument& argument, const Progress& progress, bool loops = false);
 
-/// The text of a scene file, of a built-in scene, or of a scene made from a mesh, with the folder its paths start from.
-/// [main]
+/// The text of a scene file, of a built-in scene, or of a scene made from a mesh or a volume, with the folder its paths
+/// start from. [main]
 struct SceneText {
   std::string text;
   std::string folder;

@@ -10,6 +10,7 @@ window.addEventListener("error", (event) => {
   const page = document.getElementById("page");
   const force_colours = { normal: "#4a86cf", tangential: "#e0853a", magnitude: "#8a929e" };
   const law_colours = ["#4477aa", "#ee6677", "#228833", "#c2a52b", "#3fb1d8", "#aa3377", "#e0853a", "#8a929e"];
+  const follow_hint = "How far the field at the probe is from the isosurface's value, as a share of the largest difference in the volume.";
   const groups = {};
 
   // --- small helpers ---
@@ -199,6 +200,8 @@ window.addEventListener("error", (event) => {
     card(grid, "Largest jump in a tick", number(n.jump_n), "N", n.jump_mm === null ? `tick ${count(n.jump_tick)}` : `at ${number(n.jump_mm, 4)} mm, tick ${count(n.jump_tick)}`);
     card(grid, "Energy given back", number(n.generated_mj, 2), "mJ", `beyond what was taken; ${number(n.absorbed_mj, 2)} mJ taken` +
       (n.mean_loop_mj === null ? "" : `; ${number(n.mean_loop_mj, 2)} mJ a loop`));
+    if (n.follow_samples > 0)
+      card(grid, "Follow error", number(n.follow_global_percent), "%", `mean over time ${number(n.follow_mean_percent)} %, ${number(n.follow_min_percent)} to ${number(n.follow_max_percent)} %`);
     card(grid, "Update time, median", number(n.update_p50_us), "\u00b5s", `p99 ${number(n.update_p99_us)}, p99.9 ${number(n.update_p999_us)}, at most ${number(n.update_max_us)} \u00b5s`);
     card(grid, "In contact", percent(n.ticks > 0 ? n.contact_ticks / n.ticks : null), "", `${count(n.contact_ticks)} of ${count(n.ticks)} ticks, ${number(n.length_mm)} mm travelled`);
     card(grid, "Safety stage", count(n.interventions), "ticks changed", n.interventions > 0 ? `by ${number(n.largest_intervention_n)} N at most` : "every rendered force went out as it was");
@@ -233,6 +236,8 @@ window.addEventListener("error", (event) => {
       peak_normal_hz: "Normal force, strongest frequency (Hz)", peak_tangential_hz: "Tangential force, strongest frequency (Hz)",
       peak_normal_per_mm: "Normal force, strongest spatial frequency (1/mm)", peak_tangential_per_mm: "Tangential force, strongest spatial frequency (1/mm)",
       work_mj: "Work on the hand, whole run (mJ)", held_work_mj: "The same with forces held from tick to tick (mJ)", absorbed_mj: "Most energy taken at one time (mJ)",
+      follow_samples: "Ticks compared with the isosurface's value", follow_global_percent: "Follow error over the path (%)",
+      follow_mean_percent: "Follow error, mean over time (%)", follow_min_percent: "Follow error, smallest (%)", follow_max_percent: "Follow error, largest (%)",
       generated_mj: "Largest rise of work + stored energy (mJ)", mean_loop_mj: "Energy a loop, mean (mJ)", interventions: "Ticks changed by the safety stage",
       largest_intervention_n: "Largest change by the safety stage (N)", update_mean_us: "Update time, mean (\u00b5s)", update_p50_us: "Update time, median (\u00b5s)",
       update_p99_us: "Update time, p99 (\u00b5s)", update_p999_us: "Update time, p99.9 (\u00b5s)", update_max_us: "Update time, largest (\u00b5s)",
@@ -243,7 +248,10 @@ window.addEventListener("error", (event) => {
       make(row, "td", "", name);
       make(row, "td", "", value);
     };
-    for (const [key, name] of Object.entries(names)) add(name, Number.isInteger(n[key]) ? count(n[key]) : number(n[key], 4));
+    for (const [key, name] of Object.entries(names)) {
+      if (key.startsWith("follow_") && n.follow_samples === 0) continue;
+      add(name, Number.isInteger(n[key]) ? count(n[key]) : number(n[key], 4));
+    }
     for (const [flag, ticks] of Object.entries(n.flags)) add(`Ticks with ${flag.replaceAll("_", " ")}`, count(ticks));
   }
 
@@ -261,6 +269,8 @@ window.addEventListener("error", (event) => {
     series_plot(page, law.force_time, { title: "Force", x: "time (s)", y: "N", unit: "s", group: "time", colours: forces });
     series_plot(page, law.energy_time, { title: "Energy", hint: "Work on the hand since the start, energy stored in the contact's spring, and their sum. A passive contact never lets the sum rise.",
       x: "time (s)", y: "mJ", unit: "s", group: "time", colours: ["#4a86cf", "#228833", "#d0475a"] });
+    if (law.follow_time)
+      series_plot(page, law.follow_time, { title: "Follow error", hint: follow_hint, x: "time (s)", y: "%", unit: "s", group: "time", zero: true, colours: ["#228833"] });
     section("Spectra and cost");
     const pair = make(page, "div", "pair");
     const two = [force_colours.normal, force_colours.tangential];
@@ -282,6 +292,8 @@ window.addEventListener("error", (event) => {
       ["largest jump (N)", (n) => number(n.jump_n)], ["energy a loop (mJ)", (n) => number(n.mean_loop_mj, 2)], ["given back (mJ)", (n) => number(n.generated_mj, 2)],
       ["update p50 (\u00b5s)", (n) => number(n.update_p50_us)], ["p99.9", (n) => number(n.update_p999_us)],
     ];
+    if (data.laws.some((law) => law.follow_time))
+      columns.push(["follow error (%)", (n) => number(n.follow_global_percent)], ["at most (%)", (n) => number(n.follow_max_percent)]);
     make(head, "th", "", "law");
     for (const [name] of columns) make(head, "th", "", name);
     make(head, "th", "left", "what the numbers say");
@@ -294,6 +306,29 @@ window.addEventListener("error", (event) => {
     }
   }
 
+  function draw_detection() {
+    if (!data.detection || data.detection.length === 0) return;
+    section("Detection of thin layers", "Share of straight passages through the isosurface of a linear field, each from a random start, in which a law answered with a contact. " +
+      "Expected: of avila, min(1, layer / distance in a tick).");
+    const table = make(make(page, "div", "scroll"), "table");
+    const head = make(make(table, "thead"), "tr");
+    for (const name of ["layer (mm)", "speed (m/s)", "expected", "avila", "cross-uncross", "proxy"]) make(head, "th", "", name);
+    const body = make(table, "tbody");
+    for (const [layer, speed, ...shares] of data.detection) {
+      const row = make(body, "tr");
+      make(row, "td", "", number(layer));
+      make(row, "td", "", number(speed));
+      for (const share of shares) make(row, "td", "", percent(share));
+    }
+    const layers = [...new Set(data.detection.map((row) => row[0]))];
+    const curves = [...layers.map((layer) => [`avila, ${number(layer)} mm`, layer, 3]), ["cross-uncross", layers[0], 4], ["proxy", layers[0], 5]];
+    const speeds = [...new Set(data.detection.map((row) => row[1]))].sort((a, b) => a - b);
+    const at = (layer, speed, column) => 100 * data.detection.find((row) => row[0] === layer && row[1] === speed)[column];
+    plot(page, { title: "Detected over speed", x: "speed (m/s)", y: "%", unit: "m/s", zero: true, labels: ["speed", ...curves.map((curve) => curve[0])],
+      colours: curves.map((_, k) => law_colours[k % law_colours.length]), series: { proxy: { strokePattern: [7, 4] } },
+      rows: speeds.map((speed) => [speed, ...curves.map(([, layer, column]) => at(layer, speed, column))]) });
+  }
+
   function draw_compare() {
     draw_table();
     make(page, "p", "hint", "Direction: angle of the force to the normal of the reconstructed relief (of the face, on a bare mesh). Height: of the felt point against the relief at the same " +
@@ -304,6 +339,9 @@ window.addEventListener("error", (event) => {
     law_plot(page, "force_distance", 2, { title: "Tangential force", hint: "Along the direction of travel; negative resists.", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
     law_plot(page, "height_distance", 1, { title: "Height followed", x: "distance (mm)", y: "mm", unit: "mm", group: "distance" });
     law_plot(page, "direction_distance", 1, { title: "Direction error", x: "distance (mm)", y: "deg", unit: "mm", group: "distance", zero: true });
+    if (data.laws.every((law) => law.follow_time))
+      law_plot(page, "follow_time", 1, { title: "Follow error over time", hint: follow_hint, x: "time (s)", y: "%", unit: "s", zero: true });
+    draw_detection();
     section("Energy, spectra");
     law_plot(page, "energy_time", 3, { title: "Work + stored energy", hint: "A passive contact never lets it rise.", x: "time (s)", y: "mJ", unit: "s" });
     law_plot(page, "spectrum_distance", 1, { title: "Normal force over distance", x: "spatial frequency (1/mm)", y: "N / \u221a(1/mm)", unit: "/mm", logarithmic: true });

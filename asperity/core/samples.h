@@ -30,6 +30,8 @@ enum class TickFlag : std::uint32_t {
       1u << 7,  ///< more instances within reach than a probe can hold at once; the farther ones are not felt
   energy_limited =
       1u << 8,  ///< the contact's spring would have gained energy from a change of the scene, and was softened
+  coarse_data = 1u << 9,   ///< part of a volume was not in memory yet and was felt from a coarser level
+  field_force = 1u << 10,  ///< a volume without a surface pushes
 };
 
 /// A set of TickFlag.
@@ -70,6 +72,8 @@ struct ForceSample {
   Vec3 proxy = Vec3::Zero();  ///< the probe's constrained twin (m); equals the probe's position in free space
   ContactSummary contact;
   Flags flags;
+  /// Coarsest level of a volume that was felt; 0 is the finest. A replay asks for the same one.
+  std::uint8_t level = 0;
 };
 
 }  // namespace asperity

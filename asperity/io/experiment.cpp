@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -33,7 +34,8 @@ Result<std::string> read_text(const std::filesystem::path& file) {
 Box base_bounds(std::span<const Instance> instances) {
   Box bounds;
   for (const Instance& instance : instances) {
-    const Box local = base_mesh(instance.surface).bounds();
+    const IsoSurface* iso = iso_of(instance.surface);
+    const Box local = iso != nullptr ? iso->surface_bounds() : base_mesh(instance.surface).bounds();
     for (unsigned corner = 0; corner < 8; ++corner) {
       bounds.include(instance.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
                                                            (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
@@ -43,50 +45,87 @@ Box base_bounds(std::span<const Instance> instances) {
   return bounds;
 }
 
-const MeshSurface& base_surface(const Surface& surface) {
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();
-  return **std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
+/// The nearest point of what carries a surface, its base mesh or the isosurface, with its outward normal. A volume in
+/// bricks is asked on its coarsest level, the one that is always in memory.
+SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, double& distance) {
+  SurfacePoint nearest{p, Vec3::Zero()};
+  if (const IsoSurface* iso = iso_of(surface)) {
+    const IsoView view = iso->view(iso->field().levels() - 1);
+    iso->field().enter();
+    const Foot foot = view.closest(p, infinity, hint.iso);
+    distance = foot.distance;
+    if (foot.found()) nearest = {foot.point, view.outward(foot.point, hint.iso)};
+    iso->field().leave();
+    return nearest;
+  }
+  const MeshSurface& base = *base_of(surface);
+  const Foot foot = base.closest(p, infinity, hint);
+  distance = foot.distance;
+  if (foot.found()) nearest = {foot.point, pseudonormal(base.mesh(), foot.element, foot.barycentric)};
+  return nearest;
 }
 
-/// The nearest point of all base meshes with its outward pseudonormal.
+/// The nearest point of all surfaces.
 SurfaceProjector projector(const Scene& scene) {
   return [&scene, hints = std::vector<Hint>(scene.instances().size())](const Vec3& p) mutable {
     SurfacePoint best{p, Vec3::Zero()};
     double nearest = infinity;
     for (std::size_t i = 0; i < scene.instances().size(); ++i) {
       const Instance& instance = scene.instances()[i];
-      const MeshSurface& base = base_surface(instance.surface);
-      const Foot foot = base.closest(instance.world_from_object.apply_inverse(p), infinity, hints[i]);
-      if (!foot.found() || foot.distance >= nearest) continue;
-      nearest = foot.distance;
-      best.point = instance.world_from_object.apply(foot.point);
-      best.normal =
-          instance.world_from_object.rotate(pseudonormal(base.mesh(), foot.element, foot.barycentric)).normalized();
+      double distance = infinity;
+      const SurfacePoint found =
+          nearest_on(instance.surface, instance.world_from_object.apply_inverse(p), hints[i], distance);
+      if (!(distance < nearest)) continue;
+      nearest = distance;
+      best.point = instance.world_from_object.apply(found.point);
+      best.normal = instance.world_from_object.rotate(found.normal).normalized();
     }
     return best;
   };
 }
 
-Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& context, SceneJson& canonical) {
+/// A scene with effects needs no surfaces.
+Result<std::vector<Instance>> read_surfaces(ObjectReader& root, bool effects, SceneContext& context,
+                                            SceneJson& canonical) {
   const SceneJson* surfaces = root.raw("surfaces");
-  const char* accepted = "an array of surfaces, each at least {\"mesh\": file}";
+  const char* accepted = "an array of surfaces, each at least {\"mesh\": file} or {\"volume\": file}";
+  canonical = SceneJson::array();
   if (surfaces == nullptr) {
+    if (effects) return std::vector<Instance>{};
     root.fail("surfaces", "is missing", accepted);
   } else if (!surfaces->is_array()) {
     root.fail_type("surfaces", *surfaces, accepted);
-  } else if (surfaces->empty() || surfaces->size() > most_surfaces) {
+  } else if ((surfaces->empty() && !effects) || surfaces->size() > most_surfaces) {
     root.fail("surfaces", fmt::format("has {} entries", surfaces->size()),
               fmt::format("1 to {} surfaces", most_surfaces));
   }
   ASPERITY_CHECK(root.status());
   std::vector<Instance> instances;
-  canonical = SceneJson::array();
   for (std::size_t i = 0; i < surfaces->size(); ++i) {
     ASPERITY_TRY(ScenePart<Instance> part, read_surface((*surfaces)[i], fmt::format("surfaces[{}]", i), context));
     instances.push_back(std::move(part.value));
     canonical.push_back(std::move(part.canonical));
   }
   return instances;
+}
+
+/// World bounds of the volumes that are felt without a surface.
+Box effect_bounds(std::span<const FieldEffect> effects) {
+  Box bounds;
+  for (const FieldEffect& effect : effects) {
+    const Box local = effect.field->bounds();
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      bounds.include(effect.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
+                                                         (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
+                                                         (corner & 4U) != 0 ? local.upper.z() : local.lower.z())));
+    }
+  }
+  return bounds;
+}
+
+/// Where there is no surface a stroke stays where it is drawn; depth counts downwards from there.
+SurfaceProjector drawn_as_it_is() {
+  return [](const Vec3& p) { return SurfacePoint{p, Vec3::UnitY()}; };
 }
 
 void read_heading(ObjectReader& root, const std::string& fallback, std::string& name) {
@@ -109,22 +148,35 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   ASPERITY_CHECK(root.status());
   ASPERITY_TRY(ScenePart<DeviceProfile> device, read_device(root.raw("device"), "device"));
   ASPERITY_TRY(ScenePart<HandImpedance> hand, read_hand(root.raw("hand"), "hand"));
-  SceneContext context{folder, device.value, progress, {}};
+  SceneContext context{folder, device.value, progress, {}, {}};
   SceneJson surfaces;
-  ASPERITY_TRY(std::vector<Instance> instances, read_surfaces(root, context, surfaces));
-  const double stiffness = instances.front().material.stiffness;
+  SceneJson effects_json;
+  ASPERITY_TRY(std::vector<FieldEffect> effects, read_effects(root, context, effects_json));
+  const bool felt_alone = !effects.empty();
+  ASPERITY_TRY(std::vector<Instance> instances, read_surfaces(root, felt_alone, context, surfaces));
+  const bool bodiless = instances.empty();
+  const double stiffness =
+      bodiless ? std::min(1000.0, device.value.max_stiffness) : instances.front().material.stiffness;
   ASPERITY_TRY(ScenePart<ProbeSettings> probe, read_probe(root.raw("probe"), "probe", device.value, stiffness));
-  const Box bounds = base_bounds(instances);
+  const Box bounds = bodiless ? effect_bounds(effects) : base_bounds(instances);
   ASPERITY_TRY(ScenePart<StrokeSettings> stroke, read_stroke(root.raw("stroke"), "stroke", bounds, context));
-  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), probe.value.radius));
+  const SceneJson* stroke_json = root.raw("stroke");
+  const auto says = [&](const char* key) { return stroke_json != nullptr && stroke_json->contains(key); };
+  if (bodiless && !says("depth") && !says("normal_force") && !says("path")) {
+    // Half way down from the top, through the middle of the volume.
+    stroke.value.depth = 0.5 * bounds.extent().y();
+    stroke.canonical["depth"] = stroke.value.depth;
+  }
+  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), probe.value.radius, std::move(effects)));
   if (progress) progress("laying the stroke", 0.0);
-  Result<StrokePath> path = build_stroke(stroke.value, projector(scene));
+  Result<StrokePath> path = build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene));
   if (!path) return std::move(path).error().at("stroke");
 
   root.write("device", std::move(device.canonical));
   root.write("hand", std::move(hand.canonical));
   root.write("probe", std::move(probe.canonical));
-  root.write("surfaces", std::move(surfaces));
+  if (!bodiless) root.write("surfaces", std::move(surfaces));
+  if (felt_alone) root.write("effects", std::move(effects_json));
   root.write("stroke", std::move(stroke.canonical));
   Experiment experiment{name,
                         std::move(scene),
@@ -167,11 +219,14 @@ Result<Experiment> with_law(const Experiment& experiment, const Law& law) {
   try {
     std::vector<Instance> instances(experiment.scene.instances().begin(), experiment.scene.instances().end());
     for (Instance& instance : instances) instance.law = law;
-    ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), experiment.scene.probe_radius()));
+    std::vector<FieldEffect> effects(experiment.scene.effects().begin(), experiment.scene.effects().end());
+    ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), experiment.scene.probe_radius(), std::move(effects)));
     Experiment changed = experiment;
     changed.scene = std::move(scene);
     SceneJson json = SceneJson::parse(experiment.canonical_json);
-    for (SceneJson& surface : json["surfaces"]) surface["law"] = law_json(law);
+    if (json.contains("surfaces")) {
+      for (SceneJson& surface : json["surfaces"]) surface["law"] = law_json(law);
+    }
     changed.canonical_json = json.dump(2, ' ', false, SceneJson::error_handler_t::replace);
     return changed;
   } catch (const std::exception& failure) {

@@ -115,12 +115,15 @@ std::string Range::text() const {
 }
 
 ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object)
+    : ObjectReader(json, std::move(place), object, keys_of(object)) {}
+
+ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object,
+                           const std::vector<std::string>& known)
     : json_(&json), place_(std::move(place)) {
   if (!json.is_object()) {
     error_ = Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place_, "an object"};
     return;
   }
-  const std::vector<std::string>& known = keys_of(object);
   for (const auto& item : json.items()) {
     if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
     const std::string near = nearest_name(item.key(), known);

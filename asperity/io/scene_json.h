@@ -53,6 +53,9 @@ class ObjectReader {
  public:
   /// `object` names an entry of scene_object_keys(). A `json` that is no object, and an unknown key, are errors.
   ObjectReader(const SceneJson& json, std::string place, std::string_view object);
+  /// The same for an object of another kind of file, with the keys that it may have.
+  ObjectReader(const SceneJson& json, std::string place, std::string_view object,
+               const std::vector<std::string>& known);
 
   [[nodiscard]] bool has(std::string_view key) const { return json_->is_object() && json_->contains(key); }
   [[nodiscard]] const std::string& place() const { return place_; }

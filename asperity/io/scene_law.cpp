@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "asperity/io/image_io.h"
@@ -78,8 +79,16 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
   return reader.status();
 }
 
+/// Refuses every option but those in `own`.
+void only(ObjectReader& reader, std::initializer_list<std::string_view> own, const std::string& who) {
+  for (const std::string_view key : {"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius",
+                                     "band", "largest_force", "retarding", "reach"}) {
+    if (std::find(own.begin(), own.end(), key) == own.end()) reader.refuse({key}, who);
+  }
+}
+
 Status read_mesostructure(ObjectReader& reader, const SceneContext& context, MesostructureLaw& law) {
-  reader.refuse({"edge_taper", "subdivisions", "influence_radius"}, "by a mesostructure law");
+  only(reader, {"formulation", "rho", "blend"}, "by a mesostructure law");
   if (law.formulation == Formulation::consistent) {
     reader.refuse({"rho", "blend"}, "by the consistent mesostructure law: the coat's \"stitching\" says how it blends");
     return reader.status();
@@ -89,14 +98,14 @@ Status read_mesostructure(ObjectReader& reader, const SceneContext& context, Mes
 }
 
 void read_generated(ObjectReader& reader, GeneratedGeometryLaw& law) {
-  reader.refuse({"formulation", "rho", "blend", "edge_taper"}, "by the law \"generated-geometry\"");
+  only(reader, {"subdivisions", "influence_radius"}, "by the law \"generated-geometry\"");
   law.subdivisions = reader.integer("subdivisions", law.subdivisions, 1, most_generated_subdivisions);
   law.influence_radius =
       reader.optional_quantity("influence_radius", Dimension::length, Range::positive()).value_or(0.0);
 }
 
 void read_dense(ObjectReader& reader, DenseMeshLaw& law) {
-  reader.refuse({"formulation", "rho", "blend", "edge_taper", "influence_radius"}, "by the law \"dense-mesh\"");
+  only(reader, {"subdivisions"}, "by the law \"dense-mesh\"");
   if (reader.has("subdivisions")) law.subdivisions = reader.integer("subdivisions", 1, 1, most_generated_subdivisions);
 }
 
@@ -122,6 +131,17 @@ SceneJson law_json(const Law& law) {
   } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
     json["type"] = "force-shading";
     json["formulation"] = formulation_names()[static_cast<std::size_t>(shading->formulation)];
+  } else if (const auto* avila = std::get_if<AvilaLaw>(&law)) {
+    json["type"] = "avila";
+    json["formulation"] = formulation_names()[static_cast<std::size_t>(avila->formulation)];
+    json["band"] = avila->band;
+    json["largest_force"] = avila->largest_force;
+    json["retarding"] = avila->retarding;
+  } else if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) {
+    json["type"] = "cross-uncross";
+    json["formulation"] = formulation_names()[static_cast<std::size_t>(cross->formulation)];
+    json["retarding"] = cross->retarding;
+    if (cross->formulation == Formulation::literal) json["reach"] = cross->reach;
   } else {
     json["type"] = law_name(law);
     if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
@@ -156,19 +176,31 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     meso->formulation = formulation(meso->formulation);
     ASPERITY_CHECK(read_mesostructure(reader, context, *meso));
   } else if (auto* shading = std::get_if<ForceShadingLaw>(&*law)) {
-    reader.refuse({"rho", "blend", "edge_taper", "subdivisions", "influence_radius"}, "by force shading");
+    only(reader, {"formulation"}, "by force shading");
     shading->formulation = formulation(shading->formulation);
   } else if (auto* height_field = std::get_if<HeightFieldLaw>(&*law)) {
-    reader.refuse({"rho", "blend", "subdivisions", "influence_radius"}, "by a height-field law");
+    only(reader, {"formulation", "edge_taper"}, "by a height-field law");
     height_field->formulation = formulation(height_field->formulation);
     height_field->edge_taper = reader.number("edge_taper", height_field->edge_taper, Range{0.0, 1.0 / 3.0});
   } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&*law)) {
     read_generated(reader, *generated);
   } else if (auto* dense = std::get_if<DenseMeshLaw>(&*law)) {
     read_dense(reader, *dense);
+  } else if (auto* avila = std::get_if<AvilaLaw>(&*law)) {
+    only(reader, {"formulation", "band", "largest_force", "retarding"}, "by the law \"avila\"");
+    avila->formulation = formulation(avila->formulation);
+    avila->band = reader.number("band", avila->band, Range::not_negative());
+    avila->largest_force = reader.quantity("largest_force", Dimension::force, avila->largest_force, Range::positive());
+    avila->retarding = reader.quantity("retarding", Dimension::damping, avila->retarding, Range::not_negative());
+  } else if (auto* cross = std::get_if<CrossUncrossLaw>(&*law)) {
+    only(reader, {"formulation", "retarding", "reach"}, "by the law \"cross-uncross\"");
+    cross->formulation = formulation(cross->formulation);
+    cross->retarding = reader.quantity("retarding", Dimension::damping, cross->retarding, Range::not_negative());
+    if (cross->formulation == Formulation::consistent)
+      reader.refuse({"reach"}, "by the consistent law \"cross-uncross\", which looks as far as it has to");
+    cross->reach = reader.optional_quantity("reach", Dimension::length, Range::not_negative()).value_or(0.0);
   } else {
-    reader.refuse({"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius"},
-                  fmt::format("by the law \"{}\"", type));
+    only(reader, {}, fmt::format("by the law \"{}\"", type));
   }
   ASPERITY_CHECK(reader.status());
   if (auto valid = validate(*law); !valid) return std::move(valid).error().at(place);

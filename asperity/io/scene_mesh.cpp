@@ -282,16 +282,26 @@ Box used_bounds(const MeshSource& source) {
   return bounds;
 }
 
+void note_fit(const MeshPart& part, const Vec3& extent, double scale, const SceneContext& context, std::string& note) {
+  note = fmt::format(
+      "mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
+      "radius of {} "
+      "(\"units\" or \"fit\" choose otherwise)",
+      part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
+      format_length(scale * extent.z()), context.device.name);
+}
+
+}  // namespace
+
 double read_units(ObjectReader& surface, bool from_file) {
   static const std::vector<std::string> names{"m", "cm", "mm", "um", "in"};
   if (!from_file) {
-    surface.refuse({"units"}, "for a generated mesh, which is in metres");
+    surface.refuse({"units"}, "for a generated mesh or volume, which is in metres");
     return 1.0;
   }
   return units[surface.choice("units", names, 0)].metres;
 }
 
-/// The largest extent that `fit` asks for (m); 0: as it is.
 double read_fit(ObjectReader& surface, bool by_default, const SceneContext& context) {
   const double workspace = context.device.workspace_radius;
   const SceneJson* fit = surface.raw("fit");
@@ -314,17 +324,6 @@ double read_fit(ObjectReader& surface, bool by_default, const SceneContext& cont
   }
   return surface.quantity("fit", Dimension::length, 0.0, Range::positive());
 }
-
-void note_fit(const MeshPart& part, const Vec3& extent, double scale, const SceneContext& context, std::string& note) {
-  note = fmt::format(
-      "mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
-      "radius of {} "
-      "(\"units\" or \"fit\" choose otherwise)",
-      part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
-      format_length(scale * extent.z()), context.device.name);
-}
-
-}  // namespace
 
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   const SceneJson* mesh = surface.raw("mesh");

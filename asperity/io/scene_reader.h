@@ -2,6 +2,7 @@
 // The parts of a scene file, one function each. Internal to io: experiment.cpp puts them together.
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,12 +17,26 @@
 
 namespace asperity {
 
+/// A volume of a scene, placed and scaled to metres.
+struct VolumePart {
+  std::shared_ptr<const ScalarField> field;
+  std::string name;  ///< what the surface is called unless the scene says otherwise
+};
+
+/// A volume, and the words that it was asked for with.
+struct SharedVolume {
+  std::string key;
+  VolumePart part;
+  SceneJson canonical;  ///< `volume`, `units` and `fit`
+};
+
 /// What the parts of a scene need to know of one another.
 struct SceneContext {
   std::filesystem::path folder;  ///< what relative paths start from
   DeviceProfile device;
   Progress progress;
   std::vector<std::string> notes;
+  std::vector<SharedVolume> volumes;  ///< read so far: entries that say the same share one
 
   void note(std::string text) { notes.push_back(std::move(text)); }
   /// `name` as an absolute path, relative ones from `folder`.
@@ -69,6 +84,21 @@ struct MeshPart {
 };
 /// Reads `mesh`, `units`, `fit` and `up` of a surface. Sets an error in `surface` or answers one. [build]
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context);
+
+/// The `units` of a file, in metres; refused for what is generated. [build]
+double read_units(ObjectReader& object, bool from_file);
+/// The largest extent that `fit` asks for (m); 0: as it is. `by_default`: to the workspace. [build]
+double read_fit(ObjectReader& object, bool by_default, const SceneContext& context);
+/// Reads a `pose`, which may be nullptr, and writes its canonical copy. [build]
+Result<Pose> read_pose(const SceneJson* json, ObjectReader& object);
+
+/// Reads `volume`, `units` and `fit` of a surface or an effect. [build]
+Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context);
+/// Reads `iso` of a surface with this volume. [build]
+Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const VolumePart& volume,
+                                                   SceneContext& context);
+/// Reads the scene's `effects`, none where there are none; their canonical copies go into `canonical`. [build]
+Result<std::vector<FieldEffect>> read_effects(ObjectReader& root, SceneContext& context, SceneJson& canonical);
 
 /// A coat for `mesh`. [build]
 Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,

@@ -1,4 +1,4 @@
-// One surface of a scene file: mesh, coat, law, material, place.
+// One surface of a scene file: mesh and coat, or volume; law, material, place.
 
 #include <fmt/format.h>
 
@@ -11,39 +11,6 @@ namespace asperity {
 namespace {
 
 constexpr double preferred_stiffness = 1000.0;  // N/m: the papers' 1 N/mm
-
-Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("pose"), "pose");
-  Pose pose;
-  pose.position = reader.lengths("position", Vec3::Zero());
-  if (const SceneJson* q = reader.raw("orientation")) {
-    reader.refuse({"axis", "angle"}, "beside orientation");
-    const bool numbers = q->is_array() && q->size() == 4 &&
-                         std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
-    if (!numbers) {
-      reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
-    } else {
-      pose.orientation =
-          Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
-      const double norm = pose.orientation.norm();
-      if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
-      // Written and read again, an orientation keeps its bits.
-      if (std::abs(norm - 1.0) > 1e-12) pose.orientation.normalize();
-    }
-  } else if (reader.has("angle") || reader.has("axis")) {
-    const Vec3 axis = reader.direction("axis", Vec3::UnitY());
-    const double angle = reader.quantity("angle", Dimension::angle, 0.0);
-    if (!reader.failed()) pose.orientation = Quat(Eigen::AngleAxisd(angle, axis.normalized()));
-  }
-  ASPERITY_CHECK(reader.status());
-  const Quat& q = pose.orientation;
-  SceneJson canonical = SceneJson::object();
-  canonical["position"] = {pose.position.x(), pose.position.y(), pose.position.z()};
-  canonical["orientation"] = {q.w(), q.x(), q.y(), q.z()};
-  surface.write("pose", std::move(canonical));
-  return pose;
-}
 
 Result<Material> read_material(const SceneJson* json, ObjectReader& surface, SceneContext& context) {
   static const SceneJson empty = SceneJson::object();
@@ -114,14 +81,12 @@ Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface,
   return Surface(std::make_shared<const ReliefSurface>(std::move(relief).value()));
 }
 
-}  // namespace
-
-Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context) {
+/// What can be touched, of triangles: mesh, sides, coat.
+Status read_triangles(ObjectReader& reader, SceneContext& context, Instance& instance) {
   static const std::vector<std::string> searches{"bvh", "octree"};
-  ObjectReader reader(json, place, "surface");
+  reader.refuse({"iso"}, "without a volume");
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(MeshPart part, read_mesh_part(reader, context));
-  Instance instance;
   instance.name = reader.text("name", part.name);
   const auto search = reader.choice("search", searches, 0) == 0 ? SearchStructure::bvh : SearchStructure::octree;
   ASPERITY_CHECK(reader.status());
@@ -129,18 +94,75 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), reader, context));
   MeshSurface base(TriangleIndex::build(std::move(mesh), search));
   instance.sides = read_sides(reader, base, context, instance.name);
-  ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
-  ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
   const SceneJson* coat_json = reader.raw("coat");
   if (coat_json == nullptr) {
     reader.refuse({"on_overlap", "shell_directions"}, "without a coat");
     instance.surface = std::make_shared<const MeshSurface>(std::move(base));
-  } else {
-    ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
-    reader.write("coat", std::move(coat.canonical));
-    ASPERITY_TRY(instance.surface,
-                 build_relief(std::move(base), std::move(coat.value), reader, context, instance.name));
+    return reader.status();
   }
+  ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
+  reader.write("coat", std::move(coat.canonical));
+  ASPERITY_TRY(instance.surface, build_relief(std::move(base), std::move(coat.value), reader, context, instance.name));
+  return success();
+}
+
+/// What can be touched, of a volume: an isosurface, from either side unless the scene says otherwise.
+Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& instance) {
+  static const std::vector<std::string> sides{"auto", "front", "both"};
+  reader.refuse({"mesh", "up", "search", "coat", "on_overlap", "shell_directions"}, "beside a volume");
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));
+  instance.name = reader.text("name", volume.name);
+  instance.sides = reader.choice("sides", sides, 0) == 1 ? Sides::front : Sides::both;
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(std::shared_ptr<const IsoSurface> surface, read_iso(reader, volume, context));
+  instance.surface = std::move(surface);
+  return success();
+}
+
+}  // namespace
+
+Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
+  static const SceneJson empty = SceneJson::object();
+  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("pose"), "pose");
+  Pose pose;
+  pose.position = reader.lengths("position", Vec3::Zero());
+  if (const SceneJson* q = reader.raw("orientation")) {
+    reader.refuse({"axis", "angle"}, "beside orientation");
+    const bool numbers = q->is_array() && q->size() == 4 &&
+                         std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
+    if (!numbers) {
+      reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
+    } else {
+      pose.orientation =
+          Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
+      const double norm = pose.orientation.norm();
+      if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
+      // Written and read again, an orientation keeps its bits.
+      if (std::abs(norm - 1.0) > 1e-12) pose.orientation.normalize();
+    }
+  } else if (reader.has("angle") || reader.has("axis")) {
+    const Vec3 axis = reader.direction("axis", Vec3::UnitY());
+    const double angle = reader.quantity("angle", Dimension::angle, 0.0);
+    if (!reader.failed()) pose.orientation = Quat(Eigen::AngleAxisd(angle, axis.normalized()));
+  }
+  ASPERITY_CHECK(reader.status());
+  const Quat& q = pose.orientation;
+  SceneJson canonical = SceneJson::object();
+  canonical["position"] = {pose.position.x(), pose.position.y(), pose.position.z()};
+  canonical["orientation"] = {q.w(), q.x(), q.y(), q.z()};
+  surface.write("pose", std::move(canonical));
+  return pose;
+}
+
+Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context) {
+  ObjectReader reader(json, place, "surface");
+  ASPERITY_CHECK(reader.status());
+  Instance instance;
+  ASPERITY_CHECK(reader.has("volume") ? read_isosurface(reader, context, instance)
+                                      : read_triangles(reader, context, instance));
+  ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
+  ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
   reader.write("law", law_json(instance.law));
   if (const SceneJson* law = reader.raw("law")) {
     ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));

@@ -83,6 +83,7 @@ void visit_columns(Visit&& visit, const TraceRecord& r) {
   visit("penetration", "m", contact.penetration);
   visit("relief_height", "m", contact.height);
   visit("flags", "", r.rendered.flags.bits());
+  visit("level", "", static_cast<std::uint32_t>(r.rendered.level));
   visit_vector(visit, {"commanded_x", "commanded_y", "commanded_z"}, "N", r.commanded);
   visit_vector(visit, {"hand_x", "hand_y", "hand_z"}, "m", r.hand);
   visit("update_time", "s", r.update_seconds);
@@ -116,9 +117,10 @@ std::string trace_sidecar_json(const Trace& trace) {
   Json columns = Json::array();
   for (const TraceColumn& column : trace_columns())
     columns.push_back(Json{{"name", column.name}, {"unit", column.unit}});
-  const Json flags{{"1", "contact"},           {"2", "not_converged"},  {"4", "started_inside"},
-                   {"8", "input_not_finite"},  {"16", "force_limited"}, {"32", "slew_limited"},
-                   {"64", "output_not_finite"}};
+  const Json flags{
+      {"1", "contact"},          {"2", "not_converged"}, {"4", "started_inside"},     {"8", "input_not_finite"},
+      {"16", "force_limited"},   {"32", "slew_limited"}, {"64", "output_not_finite"}, {"128", "contacts_dropped"},
+      {"256", "energy_limited"}, {"512", "coarse_data"}, {"1024", "field_force"}};
   Json json;
   json["format"] = "asperity trace table";
   json["version"] = 1;

@@ -22,6 +22,8 @@ using Json = nlohmann::json;
 
 constexpr std::string_view magic = "ASPTRACE";
 constexpr std::uint32_t format_version = 1;
+// The level of volumes shares four bytes with the flags: traces from before there were volumes have it 0.
+constexpr unsigned level_shift = 24;
 constexpr std::uint32_t byte_order_mark = 0x01020304U;
 constexpr std::uint32_t frame_records = 1;
 constexpr std::uint32_t frame_end = 2;
@@ -67,7 +69,9 @@ class Encoder {
     field(q.y());
     field(q.z());
   }
-  void field(const Flags& flags) { field(flags.bits()); }
+  void status(const Flags& flags, const std::uint8_t& level) {
+    field(flags.bits() | static_cast<std::uint32_t>(level) << level_shift);
+  }
 
  private:
   void append(std::uint64_t value, int count) {
@@ -93,7 +97,11 @@ class Decoder {
     field(q.y());
     field(q.z());
   }
-  void field(Flags& flags) { flags = Flags::from_bits(static_cast<std::uint32_t>(take(4))); }
+  void status(Flags& flags, std::uint8_t& level) {
+    const auto bits = static_cast<std::uint32_t>(take(4));
+    flags = Flags::from_bits(bits & ((1U << level_shift) - 1U));
+    level = static_cast<std::uint8_t>(bits >> level_shift);
+  }
 
  private:
   std::uint64_t take(std::size_t count) {
@@ -127,7 +135,7 @@ void code_record(Coder& coder, Record& r) {
   coder.field(r.rendered.contact.normal);
   coder.field(r.rendered.contact.penetration);
   coder.field(r.rendered.contact.height);
-  coder.field(r.rendered.flags);
+  coder.status(r.rendered.flags, r.rendered.level);
   coder.field(r.commanded);
   coder.field(r.hand);
   coder.field(r.update_seconds);

@@ -12,9 +12,7 @@ namespace asperity {
 inline const MeshSurface* constraint_mesh(const Instance& instance) noexcept {
   if (std::holds_alternative<GeneratedGeometryLaw>(instance.law)) return nullptr;
   if (std::holds_alternative<DenseMeshLaw>(instance.law)) return &instance.dense->surface;
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface))
-    return &(*relief)->base();
-  return std::get_if<std::shared_ptr<const MeshSurface>>(&instance.surface)->get();
+  return base_of(instance.surface);
 }
 
 /// Either of them, with the queries that the constraint solve asks.

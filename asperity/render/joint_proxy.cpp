@@ -9,36 +9,31 @@ namespace {
 
 constexpr int most_moves = 16;
 constexpr int most_attempts = 4;
-constexpr int most_pushes = 3;
+// Between two walls a ball is pushed from one to the other, each time by less.
+constexpr int most_pushes = 12;
 // On a relief a move of this share of its finest grain is not worth making.
 constexpr double rest_of_grain = 2e-3;
 // A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
 constexpr double point_of_grain = 1e-3;
 
-/// The smooth relief that the instance is felt on; nothing where it is felt on triangles.
-const ReliefSurface* relief_of(const Instance& instance) noexcept {
-  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
-  return relief != nullptr && std::holds_alternative<ProxyLaw>(instance.law) ? relief->get() : nullptr;
-}
-
 }  // namespace
 
 void JointProxy::add(const Instance& instance, ContactState& state) noexcept {
   if (entries_.size() == capacity) return;
-  Entry entry{&instance, {}, relief_of(instance), &state};
-  if (entry.relief == nullptr) entry.mesh = patches_.of(instance);
+  Entry entry{&instance, {}, SmoothSurface(instance, state), &state};
+  if (!entry.smooth) entry.mesh = patches_.of(instance);
   entries_.push_back(entry);
-  const double skin = entry.relief == nullptr ? entry.mesh.skin() : entry.relief->skin();
-  const double rest = entry.relief != nullptr ? rest_of_grain * entry.relief->grain() : 0.05 * skin;
+  const double skin = entry.smooth ? entry.smooth.skin() : entry.mesh.skin();
+  const double rest = entry.smooth ? rest_of_grain * entry.smooth.grain() : 0.05 * skin;
   tolerance_ = entries_.size() == 1 ? rest : std::max(tolerance_, rest);
-  if (entry.relief == nullptr) return;
-  margin_ = std::max({margin_, point_of_grain * entry.relief->grain(), 4.0 * skin});
+  if (!entry.smooth) return;
+  margin_ = std::max({margin_, point_of_grain * entry.smooth.grain(), 4.0 * skin});
   // What is thinner than a real ball must not slip past it; what is thinner than a blown-up point is below its skin.
-  if (radius_ > 0.25 * entry.relief->grain()) longest_step_ = std::min(longest_step_, 0.5 * radius_);
+  if (radius_ > 0.25 * entry.smooth.grain()) longest_step_ = std::min(longest_step_, 0.5 * radius_);
 }
 
 double JointProxy::gap(const Entry& entry) const noexcept {
-  return margin_ + (entry.relief == nullptr ? entry.mesh.skin() : entry.relief->skin());
+  return margin_ + (entry.smooth ? entry.smooth.skin() : entry.mesh.skin());
 }
 
 bool JointProxy::foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane,
@@ -46,16 +41,15 @@ bool JointProxy::foot_plane(std::size_t index, const Vec3& position, ConstraintP
   const Entry& entry = entries_[index];
   const Pose& pose = entry.instance->world_from_object;
   const Vec3 local = pose.apply_inverse(position);
-  const double skin = entry.relief->skin();
-  const Foot foot = entry.relief->closest(local, radius_ + gap(entry) + 2.0 * skin, entry.state->hint);
+  Vec3 front = Vec3::Zero();
+  const Foot foot =
+      entry.smooth.closest(local, radius_ + gap(entry) + entry.smooth.plane_reach(), entry.state->hint, front);
   if (!foot.found()) return false;
-  const ReliefPlace& place = entry.state->hint.relief;
-  const Vec3 front = entry.relief->point(place.frame, place.u, place.v).normal();
   const Vec3 offset = local - foot.point;
   distance = foot.distance;
   // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
   // reached has no direction of its own, the surface's is taken.
-  Vec3 normal = foot.distance > skin ? Vec3(offset / foot.distance) : foot.normal;
+  Vec3 normal = foot.distance > entry.smooth.direction_from() ? Vec3(offset / foot.distance) : foot.normal;
   if (entry.instance->sides == Sides::front && normal.dot(front) < 0.0) return false;
   normal = pose.rotate(normal);
   const Vec3 point = pose.apply(foot.point);
@@ -76,10 +70,13 @@ void JointProxy::remember(const ConstraintPlane& plane) noexcept {
 void JointProxy::touched(const Vec3& position, PlaneSet& out) noexcept {
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
-    if (entry.relief != nullptr) {
+    if (entry.smooth) {
       ConstraintPlane plane;
       double distance = 0.0;
-      if (foot_plane(i, position, plane, distance)) remember(plane);
+      if (!foot_plane(i, position, plane, distance)) continue;
+      remember(plane);
+      // Near a surface without folds its tangent plane holds before it is touched.
+      if (!entry.smooth.has_folds()) out.push_back(plane);
       continue;
     }
     const Pose& pose = entry.instance->world_from_object;
@@ -94,6 +91,10 @@ void JointProxy::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
   for (std::size_t i = feet_.size(); i-- > 0;) {
     const ConstraintPlane& plane = feet_[i];
+    bool known = false;
+    for (const ConstraintPlane& other : out)
+      known = known || (other.owner == plane.owner && other.normal == plane.normal);
+    if (known) continue;
     const double apart = plane.normal.dot(position) - plane.offset - plane.skin;
     const Vec3 foot = entries_[plane.owner].instance->world_from_object.apply(plane.contact.point);
     // Feet found on the way stay as long as the ball is about as near to them as their surface bends.
@@ -112,33 +113,33 @@ double JointProxy::free_share(const Segment& motion) noexcept {
   for (Entry& entry : entries_) {
     const Pose& pose = entry.instance->world_from_object;
     const Segment local{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
-    if (entry.relief == nullptr) {
+    if (!entry.smooth) {
       share = std::min(share, entry.mesh.segment(local, radius_ + margin_, entry.instance->sides, entry.state->hint).t);
       continue;
     }
     Hint scratch;
-    const SweptHit hit = entry.relief->segment(local, 0.0, entry.instance->sides, scratch);
+    const SweptHit hit = entry.smooth.segment(local, entry.instance->sides, scratch);
     // The centre itself must stay outside: half of the ball before what it meets.
     if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin_) / length));
   }
   return share;
 }
 
-Vec3 JointProxy::pushed_out(Vec3 position) noexcept {
-  for (int push = 0; push < most_pushes; ++push) {
-    bool moved = false;
+Vec3 JointProxy::pushed_out(Vec3 position, bool& clear) noexcept {
+  clear = false;
+  for (int push = 0; push < most_pushes && !clear; ++push) {
+    clear = true;
     for (std::size_t i = 0; i < entries_.size(); ++i) {
-      if (entries_[i].relief == nullptr) continue;
+      if (!entries_[i].smooth) continue;
       ConstraintPlane plane;
       double distance = 0.0;
       if (!foot_plane(i, position, plane, distance)) continue;
       remember(plane);
       const double missing = plane.offset + plane.skin - plane.normal.dot(position);
-      if (missing <= 0.25 * entries_[i].relief->skin()) continue;
+      if (missing <= 0.25 * entries_[i].smooth.skin()) continue;
       position += missing * plane.normal;
-      moved = true;
+      clear = false;
     }
-    if (!moved) break;
   }
   return position;
 }
@@ -163,9 +164,10 @@ ConstraintSolution JointProxy::solve(const Vec3& from, const Vec3& goal) noexcep
     for (int attempt = 0; attempt < most_attempts && !moved; ++attempt) {
       const double share = free_share({solution.proxy, solution.proxy + step});
       Vec3 next = solution.proxy + share * step;
-      const Vec3 out = pushed_out(next);
+      bool clear = false;
+      const Vec3 out = pushed_out(next, clear);
       if (out != next) next += free_share({next, out}) * (out - next);
-      moved = (next - goal).norm() < distance - 1e-2 * tolerance_;
+      moved = clear && (next - goal).norm() < distance - 1e-2 * tolerance_;
       if (moved) {
         solution.proxy = next;
       } else {

@@ -4,6 +4,7 @@
 #include "asperity/render/constraint_geometry.h"
 #include "asperity/render/constraint_solve.h"
 #include "asperity/render/law_forces.h"
+#include "asperity/render/smooth_surface.h"
 
 namespace asperity {
 
@@ -24,11 +25,14 @@ class JointProxy {
   ConstraintSolution solve(const Vec3& from, const Vec3& goal) noexcept;
   /// The planes that the ball touches at a place, for friction. [servo]
   void touched(const Vec3& position, PlaneSet& out) noexcept;
+  /// Where the ball is pushed out of smooth surfaces that it overlaps; `clear` tells whether it overlaps none any more.
+  /// [servo]
+  [[nodiscard]] Vec3 pushed_out(Vec3 position, bool& clear) noexcept;
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
   /// Whether every query was answered from everything around it. [servo]
   [[nodiscard]] bool complete() const noexcept {
     bool all = true;
-    for (const Entry& entry : entries_) all = all && (entry.relief != nullptr || entry.mesh.complete());
+    for (const Entry& entry : entries_) all = all && (entry.smooth || entry.mesh.complete());
     return all;
   }
   [[nodiscard]] const Instance& instance(std::size_t index) const noexcept { return *entries_[index].instance; }
@@ -37,8 +41,8 @@ class JointProxy {
  private:
   struct Entry {
     const Instance* instance = nullptr;
-    ConstraintGeometry mesh;                ///< where there is no relief
-    const ReliefSurface* relief = nullptr;  ///< law proxy
+    ConstraintGeometry mesh;  ///< where nothing is smooth
+    SmoothSurface smooth;     ///< law proxy on a relief or an isosurface
     ContactState* state = nullptr;
   };
 
@@ -46,12 +50,11 @@ class JointProxy {
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane,
                                 double& distance) noexcept;
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
-  [[nodiscard]] Vec3 pushed_out(Vec3 position) noexcept;
   void remember(const ConstraintPlane& plane) noexcept;
 
   GeneratedPatches patches_;
   FixedVector<Entry, capacity> entries_;
-  FixedVector<ConstraintPlane, 6> feet_;  ///< of reliefs, found while the ball moved
+  FixedVector<ConstraintPlane, 6> feet_;  ///< of smooth surfaces, found while the ball moved
   double radius_;
   double margin_ = 0.0;  ///< by which the ball is blown up, so that a point has a surface of its own (m)
   double tolerance_ = infinity;

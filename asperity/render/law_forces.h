@@ -26,6 +26,23 @@ LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surf
 LawForce mesostructure_force(const MesostructureLaw& law, const ReliefSurface& surface, const Material& material,
                              const Vec3& probe, ContactState& state) noexcept;
 
+/// Width of the layer that the law pushes in, by the field's unit: its own, or the one whose force rises by the
+/// material's stiffness where the field's slope is typical. Above 0. [any]
+double avila_band(const AvilaLaw& law, const IsoSurface& surface, const Material& material) noexcept;
+/// large-data-2008, eq. 5 to 8 (M1). `probe` and `velocity` in the object frame, `view` what is felt now of `surface`.
+/// Felt from the front alone: a probe that starts inside, or comes in where the volume ends, feels nothing in the
+/// consistent form until it has been outside. No force beyond the layer. [servo]
+LawForce avila_force(const AvilaLaw& law, const IsoSurface& surface, const IsoView& view, const Material& material,
+                     const Vec3& probe, const Vec3& velocity, ContactState& state) noexcept;
+/// large-data-2008, eq. 11 to 15 (M2): force = k (V - probe) - retarding velocity while crossed; penetration |V -
+/// probe|. Felt from the front alone, whatever the instance's sides: inside out is the "uncross" that ends a contact.
+/// Leaving the volume ends it too. Of a motion that crosses and uncrosses within a tick only the end counts. Keeps
+/// state.iso's previous, value, started, crossed, point and normal, and state.seen_outside; its field, threshold and
+/// level are the caller's. [servo]
+LawForce cross_uncross_force(const CrossUncrossLaw& law, const IsoSurface& surface, const IsoView& view,
+                             const Material& material, const Vec3& probe, const Vec3& velocity,
+                             ContactState& state) noexcept;
+
 /// The shell around a probe, as the consistent forms of Algorithms 1 and 2 need it.
 struct ShellContact {
   bool found = false;       ///< false: no surface

@@ -20,6 +20,31 @@ Error option_error(std::string option, double value, std::string accepted) {
   return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, std::move(option), std::move(accepted)};
 }
 
+Status validate_avila(const AvilaLaw& law) {
+  if (!(law.band >= 0.0 && std::isfinite(law.band)))
+    return option_error("band", law.band, "a width above 0 in the field's unit, or 0 to choose it by the stiffness");
+  if (!(law.largest_force > 0.0 && std::isfinite(law.largest_force)))
+    return option_error("largest_force", law.largest_force, "a force above 0 (N)");
+  if (!(law.retarding >= 0.0 && std::isfinite(law.retarding)))
+    return option_error("retarding", law.retarding, "a viscosity of 0 or more (N·s/m)");
+  return success();
+}
+
+Status validate_cross_uncross(const CrossUncrossLaw& law) {
+  if (!(law.retarding >= 0.0 && std::isfinite(law.retarding)))
+    return option_error("retarding", law.retarding, "a viscosity of 0 or more (N·s/m)");
+  if (!(law.reach >= 0.0 && std::isfinite(law.reach)))
+    return option_error("reach", law.reach, "a length of 0 or more (m, mm)");
+  if (law.reach > 0.0 && law.formulation == Formulation::consistent) {
+    return Error{ErrorCode::bad_value,
+                 "is the literal form's: the consistent one looks as far as it has to",
+                 {},
+                 "reach",
+                 "0, or formulation \"literal\""};
+  }
+  return success();
+}
+
 }  // namespace
 
 std::string law_name(const Law& law) {
@@ -32,6 +57,8 @@ std::string law_name(const Law& law) {
                         [&](const MesostructureLaw& l) { return "mesostructure" + suffix(l.formulation); },
                         [](const GeneratedGeometryLaw&) { return std::string("generated-geometry"); },
                         [](const DenseMeshLaw&) { return std::string("dense-mesh"); },
+                        [&](const AvilaLaw& l) { return "avila" + suffix(l.formulation); },
+                        [&](const CrossUncrossLaw& l) { return "cross-uncross" + suffix(l.formulation); },
                     },
                     law);
 }
@@ -46,7 +73,11 @@ const std::vector<std::string>& law_names() {
                                               "mesostructure",
                                               "mesostructure-literal",
                                               "generated-geometry",
-                                              "dense-mesh"};
+                                              "dense-mesh",
+                                              "avila",
+                                              "avila-literal",
+                                              "cross-uncross",
+                                              "cross-uncross-literal"};
   return names;
 }
 
@@ -63,6 +94,10 @@ Result<Law> law_by_name(std::string_view name) {
   if (name == "mesostructure-literal") return Law(MesostructureLaw{Formulation::literal, 0.05, Blend::s_shape, {}});
   if (name == "generated-geometry") return Law(GeneratedGeometryLaw{});
   if (name == "dense-mesh") return Law(DenseMeshLaw{});
+  if (name == "avila") return Law(AvilaLaw{});
+  if (name == "avila-literal") return Law(AvilaLaw{Formulation::literal});
+  if (name == "cross-uncross") return Law(CrossUncrossLaw{});
+  if (name == "cross-uncross-literal") return Law(CrossUncrossLaw{Formulation::literal});
   std::string list;
   for (const std::string& known : law_names()) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, law_names());
@@ -74,6 +109,8 @@ Result<Law> law_by_name(std::string_view name) {
 }
 
 Status validate(const Law& law) {
+  if (const auto* avila = std::get_if<AvilaLaw>(&law)) return validate_avila(*avila);
+  if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) return validate_cross_uncross(*cross);
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     const double taper = height_field->edge_taper;
     if (!(taper >= 0.0 && taper <= 1.0 / 3.0)) return option_error("edge_taper", taper, "0 to 1/3");

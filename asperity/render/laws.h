@@ -75,11 +75,40 @@ struct DenseMeshLaw {
   int subdivisions = 0;  ///< cuts along each edge of a base triangle; 0: triangles of a texel, if not too many
 };
 
+/// Isosurface felt from the field's value at the probe alone (Avila and Sobierajski 1996; large-data-2008, M1, eq. 5 to
+/// 10). Between two thresholds the volume pushes along its gradient; a probe that jumps over that layer within a tick
+/// feels nothing. Felt from the front alone.
+///   literal     as printed, eq. 6 to 8, N the gradient: where low values are inside the force is greatest at first
+///               touch, where high ones are it pulls inwards; R points along the motion and f_r takes the field's unit
+///   consistent  f_s rises from the surface's threshold inwards, along the outward normal, f_r = C2 (1 + share of the
+///               layer), R = -f_r v
+struct AvilaLaw {
+  Formulation formulation = Formulation::consistent;
+  /// Width of the layer in the field's unit, from the surface's threshold inwards; 0: as wide as makes the material's
+  /// stiffness where the field's slope is typical.
+  double band = 0.0;
+  double largest_force = 3.0;  ///< C1 (N), above 0
+  double retarding = 0.0;      ///< C2 (N·s/m), 0 or more
+};
+
+/// Isosurface that is crossed and uncrossed (large-data-2008, M2, eq. 11 to 15): from a crossing on, the probe is held
+/// by a spring to the surface's point along the gradient. Felt from the front alone.
+///   literal     as printed: at most 1024 grid points of a 3-D line (Bresenham) a tick, the path loop that leaves at
+///   its
+///               first outside point, the sample nearest to the threshold in place of a root, the gradient saved at the
+///               crossing. The printed f_s of eq. 8 is not part of it: S = k (V - R)
+///   consistent  every crossing on the way, by exact roots; V found anew every tick, along the normal where it was last
+struct CrossUncrossLaw {
+  Formulation formulation = Formulation::consistent;
+  double retarding = 0.0;  ///< R = -retarding v while crossed (N·s/m), 0 or more
+  double reach = 0.0;      ///< literal: alpha |N| of eq. 15, how far T lies from the probe (m); 0: 64 cells
+};
+
 using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw,
-                         GeneratedGeometryLaw, DenseMeshLaw>;
+                         GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw>;
 
 /// "proxy", "god-object", "force-shading", "height-field", "mesostructure", the last two with "-literal" appended where
-/// it is, "generated-geometry", "dense-mesh". [any]
+/// it is, "generated-geometry", "dense-mesh", "avila", "cross-uncross" (and "-literal"). [any]
 std::string law_name(const Law& law);
 /// The law of that name with default options. Errors: bad_value listing the names. [any]
 Result<Law> law_by_name(std::string_view name);
@@ -87,6 +116,11 @@ Result<Law> law_by_name(std::string_view name);
 const std::vector<std::string>& law_names();
 /// Errors: bad_value naming the option and what would be accepted. [build]
 Status validate(const Law& law);
+
+/// Whether the law reads a scalar field, and so is felt on isosurfaces alone. [any]
+constexpr bool needs_field(const Law& law) noexcept {
+  return std::holds_alternative<AvilaLaw>(law) || std::holds_alternative<CrossUncrossLaw>(law);
+}
 
 /// Whether the law takes part in the joint constraint solve (it moves the proxy) rather than adding a force of its own.
 /// [any]

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "asperity/render/god_object.h"
+#include "asperity/render/iso_proxy.h"
 #include "asperity/render/joint_proxy.h"
 #include "asperity/render/proxy.h"
 
@@ -26,15 +27,29 @@ Vec3 on_cone(const Vec3& force, const Vec3& normal, const Friction& friction, bo
   return length <= most ? force : Vec3(push * normal + (most / length) * along);
 }
 
-/// One relief, touched by a point.
-ProxyAnswer on_relief(const Instance& instance, const ReliefSurface& relief, ContactState& slot, const Vec3& from,
+const IsoSurface* proxied_iso(const Instance& instance) noexcept {
+  return std::holds_alternative<ProxyLaw>(instance.law) ? iso_of(instance.surface) : nullptr;
+}
+
+/// Whether the proxy's law goes by a smooth surface rather than by triangles.
+bool smooth(const Instance& instance) noexcept {
+  return proxied_relief(instance) != nullptr || proxied_iso(instance) != nullptr;
+}
+
+/// One smooth surface, touched by a point.
+ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& from,
                       const ProbeSample& probe) noexcept {
   const Pose& pose = instance.world_from_object;
   const bool at_origin = pose.is_identity();
   const Vec3& position = probe.pose.position;
   const Friction friction = friction_of(instance);
-  const ProxyRest rest = solve_on_relief(relief, instance.sides, friction, at_origin ? from : pose.apply_inverse(from),
-                                         at_origin ? position : pose.apply_inverse(position), slot);
+  const Vec3 local_from = at_origin ? from : pose.apply_inverse(from);
+  const Vec3 local_probe = at_origin ? position : pose.apply_inverse(position);
+  const ReliefSurface* relief = proxied_relief(instance);
+  const ProxyRest rest = relief != nullptr
+                             ? solve_on_relief(*relief, instance.sides, friction, local_from, local_probe, slot)
+                             : solve_on_iso(felt_view(*proxied_iso(instance), slot), instance.sides, friction,
+                                            local_from, local_probe, slot);
   ProxyAnswer answer;
   answer.converged = rest.converged;
   answer.proxy = position;
@@ -48,8 +63,12 @@ ProxyAnswer on_relief(const Instance& instance, const ReliefSurface& relief, Con
     law.force = with_damping(on_cone(instance.material.stiffness * spring, law.normal, friction, slot.sliding),
                              law.normal, probe.twist.linear, instance.material.damping);
     law.point = answer.proxy;
-    law.height = slot.point.jet.height;
-    law.element = slot.hint.relief.frame.face;
+    if (relief != nullptr) {
+      law.height = slot.point.jet.height;
+      law.element = slot.hint.relief.frame.face;
+    } else {
+      law.element = proxied_iso(instance)->element_of(slot.iso.level, slot.iso.point);
+    }
   }
   answer.felt = answer.proxy;
   answer.parts.push_back({slot.instance, law});
@@ -191,20 +210,17 @@ void limit_energy(const Scene& scene, ProxyState& state, const Vec3& before, con
 
 }  // namespace
 
-ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held) noexcept {
+ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held,
+                          bool moved) noexcept {
   const Vec3& position = probe.pose.position;
   const Vec3 before = state.proxy;
-  const ReliefSurface* relief = nullptr;
-  ContactState* relief_slot = nullptr;
+  ContactState* smooth_slot = nullptr;
   std::size_t constrained = 0;
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.instances()[slot.instance];
     if (!constrains(instance.law)) continue;
     ++constrained;
-    if (const ReliefSurface* one = proxied_relief(instance)) {
-      relief = one;
-      relief_slot = &slot;
-    }
+    if (smooth(instance)) smooth_slot = &slot;
   }
   ProxyAnswer answer;
   answer.proxy = answer.felt = position;
@@ -225,7 +241,7 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
       answer.parts.push_back({solver.state(i).instance, law});
     }
   };
-  if (relief == nullptr) {
+  if (smooth_slot == nullptr) {
     MeshConstraints constraints(scene.probe_radius());
     for (ContactState& slot : state.contacts) {
       if (constrains(scene.instances()[slot.instance].law)) constraints.add(scene.instances()[slot.instance], slot);
@@ -238,7 +254,7 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
         [&](std::uint32_t owner) -> const Instance& { return constraints.instance(owner); });
     gather(constraints, solution, goal);
   } else if (constrained == 1 && scene.probe_radius() == 0.0) {
-    answer = on_relief(scene.instances()[relief_slot->instance], *relief, *relief_slot, before, probe);
+    answer = on_smooth(scene.instances()[smooth_slot->instance], *smooth_slot, before, probe);
   } else {
     JointProxy joint(scene.probe_radius());
     Vec3 from = before;
@@ -246,13 +262,17 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
       const Instance& instance = scene.instances()[slot.instance];
       if (!constrains(instance.law)) continue;
       joint.add(instance, slot);
-      if (slot.touching && proxied_relief(instance) != nullptr) {
+      if (slot.touching && smooth(instance)) {
         // Held as a point until now: a little off the surface it may roll.
-        const Vec3 normal = slot.side * slot.point.normal();
-        from += 2.0 * proxied_relief(instance)->skin() * instance.world_from_object.rotate(normal);
+        const ReliefSurface* relief = proxied_relief(instance);
+        const Vec3 normal = relief != nullptr ? Vec3(slot.side * slot.point.normal()) : slot.iso.normal;
+        const double skin = relief != nullptr ? relief->skin() : proxied_iso(instance)->skin();
+        from += 2.0 * skin * instance.world_from_object.rotate(normal);
       }
       slot.touching = false;
     }
+    bool clear = false;
+    if (moved) from = joint.pushed_out(from, clear);
     Vec3 goal;
     const ConstraintSolution solution = solve_with_friction(
         from, position, state.sliding, goal, [&](const Vec3& at, PlaneSet& planes) { joint.touched(at, planes); },
@@ -274,7 +294,17 @@ Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
     Vec3 front;
     Foot foot;
     double skin = 0.0;
-    if (const ReliefSurface* relief = proxied_relief(instance)) {
+    if (iso_of(instance.surface) != nullptr) {
+      // A point in touch moves with its isosurface (update_felt); here is one that the scene newly has.
+      if (slot.touching || slot.iso.field != 0) continue;
+      const IsoView view = iso_of(instance.surface)->view();
+      FieldJet jet;
+      if (!view.sample(local, slot.hint.iso, jet) || view.sigma * (jet.value - view.threshold) >= 0.0) continue;
+      foot = view.closest(local, infinity, slot.hint.iso);
+      if (!foot.found()) continue;
+      front = view.outward(foot.point, slot.hint.iso);
+      skin = view.skin();
+    } else if (const ReliefSurface* relief = proxied_relief(instance)) {
       foot = relief->closest(local, infinity, slot.hint);
       if (!foot.found()) continue;
       front = relief->point(slot.hint.relief.frame, slot.hint.relief.u, slot.hint.relief.v).normal();

@@ -20,8 +20,10 @@ struct ProxyAnswer {
 
 /// Solves for the instances of the state's slots whose law constrains. Reads and writes the state's tank and friction,
 /// not its proxy. `held`: where the proxy was at the end of the last tick, before a change of the scene moved it: what
-/// the spring may hold is counted from there. [servo]
-ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held) noexcept;
+/// the spring may hold is counted from there. `moved`: an isosurface is on its way to another threshold and may have
+/// come into a ball. [servo]
+ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held,
+                          bool moved) noexcept;
 
 /// After a change of the scene: where the proxy may start, outside of every front that it would now be behind. [servo]
 Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept;

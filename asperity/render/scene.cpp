@@ -41,29 +41,44 @@ Status make_dense(Instance& instance, std::size_t index) {
   return success();
 }
 
+/// Whether the law can be felt on the surface at all.
+Status check_pair(const Instance& instance, const std::string& place) {
+  const bool iso = iso_of(instance.surface) != nullptr;
+  const bool bare = instance.surface.index() == 0;
+  const auto refuse = [&](const char* what, const char* accepted) {
+    return Error{ErrorCode::unsupported_pair,
+                 fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
+                             iso    ? "an isosurface"
+                             : bare ? "a bare mesh"
+                                    : "a relief"),
+                 {},
+                 place + ".law",
+                 accepted};
+  };
+  if (needs_field(instance.law) && !iso) return refuse("a volume", "another law, or a surface with a volume");
+  if (iso && !needs_field(instance.law) && !std::holds_alternative<ProxyLaw>(instance.law))
+    return refuse(needs_coat(instance.law) ? "a coat" : "triangles", "proxy, avila or cross-uncross");
+  if (bare && needs_coat(instance.law))
+    return refuse("a coat", "proxy, god-object or force-shading, or a coat on the mesh");
+  return success();
+}
+
 Status check(const Instance& instance, std::size_t index, double probe_radius) {
   const std::string place = fmt::format("surfaces[{}]", index);
   if (std::visit([](const auto& surface) { return surface == nullptr; }, instance.surface)) {
-    return Error{ErrorCode::bad_value, "holds no surface", {}, place + ".surface", "a mesh or relief surface"};
+    return Error{ErrorCode::bad_value, "holds no surface", {}, place + ".surface", "a mesh, relief or isosurface"};
   }
-  const bool bare = std::holds_alternative<std::shared_ptr<const MeshSurface>>(instance.surface);
+  ASPERITY_CHECK(check_pair(instance, place));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
-  if (bare && needs_coat(instance.law)) {
-    return Error{
-        ErrorCode::unsupported_pair,
-        fmt::format("the law \"{}\" needs a coat, and \"{}\" is a bare mesh", law_name(instance.law), instance.name),
-        {},
-        place + ".law",
-        "proxy, god-object or force-shading, or a coat on the mesh"};
-  }
   if (probe_radius > 0.0 && !constrains(instance.law)) {
     return Error{ErrorCode::unsupported_pair,
                  fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
                              law_name(instance.law), format_length(probe_radius)),
                  {},
                  place + ".law",
-                 "proxy, god-object or force-shading, or probe.radius 0"};
+                 iso_of(instance.surface) != nullptr ? "proxy, or probe.radius 0"
+                                                     : "proxy, god-object or force-shading, or probe.radius 0"};
   }
   const Pose& pose = instance.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
@@ -88,25 +103,39 @@ Box transformed(const Box& box, const Pose& pose) {
 }  // namespace
 
 const char* surface_kind(const Surface& surface) {
-  return surface.index() == 0 ? "mesh" : "relief";
+  constexpr const char* names[] = {"mesh", "relief", "iso"};
+  return names[surface.index()];
 }
 
 Box surface_bounds(const Surface& surface) {
   return std::visit([](const auto& s) { return s->bounds(); }, surface);
 }
 
-const TriangleMesh& base_mesh(const Surface& surface) {
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base().mesh();
-  return (*std::get_if<std::shared_ptr<const MeshSurface>>(&surface))->mesh();
+const MeshSurface* base_of(const Surface& surface) noexcept {
+  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return &(*relief)->base();
+  const auto* mesh = std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
+  return mesh != nullptr ? mesh->get() : nullptr;
 }
 
-Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius) {
+const IsoSurface* iso_of(const Surface& surface) noexcept {
+  const auto* iso = std::get_if<std::shared_ptr<const IsoSurface>>(&surface);
+  return iso != nullptr ? iso->get() : nullptr;
+}
+
+const TriangleMesh& base_mesh(const Surface& surface) {
+  return base_of(surface)->mesh();
+}
+
+Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius, std::vector<FieldEffect> effects) {
   if (!std::isfinite(probe_radius) || probe_radius < 0.0) {
     return Error{
         ErrorCode::bad_value, fmt::format("is {}", probe_radius), {}, "probe.radius", "a length of 0 or more (m, mm)"};
   }
-  if (instances.empty()) {
-    return Error{ErrorCode::bad_value, "holds nothing to touch", {}, "surfaces", "at least one surface"};
+  if (instances.empty() && effects.empty()) {
+    return Error{ErrorCode::bad_value, "holds nothing to touch", {}, "surfaces", "at least one surface or effect"};
+  }
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    if (auto valid = validate(effects[i]); !valid) return std::move(valid).error().at(fmt::format("effects[{}]", i));
   }
   Scene scene;
   for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -118,6 +147,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius)
         transformed(bounds.grown(probe_radius + 1e-6 * bounds.diagonal()), instances[i].world_from_object));
   }
   scene.instances_ = std::move(instances);
+  scene.effects_ = std::move(effects);
   scene.probe_radius_ = probe_radius;
   scene.epoch_ = next_epoch();
   return scene;
@@ -126,6 +156,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius)
 Box Scene::world_bounds() const noexcept {
   Box all;
   for (const Box& box : bounds_) all.include(box);
+  for (const FieldEffect& effect : effects_) all.include(transformed(effect.field->bounds(), effect.world_from_object));
   return all;
 }
 
@@ -133,12 +164,15 @@ std::size_t Scene::memory_bytes() const noexcept {
   std::size_t bytes = sizeof(*this);
   for (const Instance& instance : instances_) {
     if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
-    if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
+    if (const IsoSurface* iso = iso_of(instance.surface)) {
+      bytes += iso->field().memory_bytes();
+    } else if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
       bytes += (*relief)->base().index().memory_bytes() + (*relief)->coat().memory_bytes();
     } else {
       bytes += (*std::get_if<std::shared_ptr<const MeshSurface>>(&instance.surface))->index().memory_bytes();
     }
   }
+  for (const FieldEffect& effect : effects_) bytes += sizeof(FieldEffect) + effect.field->memory_bytes();
   return bytes;
 }
 

@@ -11,20 +11,27 @@
 #include "asperity/core/frames.h"
 #include "asperity/core/result.h"
 #include "asperity/material/material.h"
+#include "asperity/render/field_effects.h"
 #include "asperity/render/laws.h"
+#include "asperity/surface/iso_surface.h"
 #include "asperity/surface/mesh_surface.h"
 #include "asperity/surface/relief_surface.h"
 
 namespace asperity {
 
 /// The closed set of providers. Shared, because snapshots that follow one another share what did not change.
-using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr<const ReliefSurface>>;
+using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr<const ReliefSurface>,
+                             std::shared_ptr<const IsoSurface>>;
 
-/// "mesh", "relief": the provider's name in messages. [any]
+/// "mesh", "relief", "iso": the provider's name in messages. [any]
 const char* surface_kind(const Surface& surface);
 /// Bounds in the object frame (m). [any]
 Box surface_bounds(const Surface& surface);
-/// The mesh that carries the surface. [any]
+/// The mesh that carries the surface; nullptr for an isosurface. [any]
+const MeshSurface* base_of(const Surface& surface) noexcept;
+/// The isosurface, or nullptr. [any]
+const IsoSurface* iso_of(const Surface& surface) noexcept;
+/// The mesh of a surface that has one. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 
 /// A relief as a dense mesh, with what it was made from.
@@ -52,9 +59,12 @@ class Scene {
   /// Validates everything. Errors: unsupported_pair (a law that needs a coat on a bare mesh), bad_value (material, law
   /// option, probe radius, pose not finite), too_large (a dense mesh of too many triangles), each with the instance's
   /// place. [build]
-  static Result<Scene> build(std::vector<Instance> instances, double probe_radius);
+  static Result<Scene> build(std::vector<Instance> instances, double probe_radius,
+                             std::vector<FieldEffect> effects = {});
 
   [[nodiscard]] std::span<const Instance> instances() const noexcept { return instances_; }
+  /// What is felt everywhere in a volume, without a surface. [servo]
+  [[nodiscard]] std::span<const FieldEffect> effects() const noexcept { return effects_; }
   /// Radius of the probe's tip (m); 0 is a point. [servo]
   [[nodiscard]] double probe_radius() const noexcept { return probe_radius_; }
   /// Tells snapshots apart, never 0. A state made for another one re-acquires its contacts. [servo]
@@ -68,6 +78,7 @@ class Scene {
   Scene() = default;
 
   std::vector<Instance> instances_;
+  std::vector<FieldEffect> effects_;
   std::vector<Box> bounds_;
   double probe_radius_ = 0.0;
   std::uint64_t epoch_ = 0;

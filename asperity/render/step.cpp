@@ -1,5 +1,8 @@
 #include "asperity/render/step.h"
 
+#include <algorithm>
+
+#include "asperity/render/iso_proxy.h"
 #include "asperity/render/proxy_tick.h"
 
 namespace asperity {
@@ -56,8 +59,15 @@ bool update_slots(const Scene& scene, ProxyState& state, const Box& reach) noexc
   return all;
 }
 
-LawForce relief_force(const Instance& instance, const ReliefSurface& relief, const Vec3& probe,
-                      ContactState& slot) noexcept {
+LawForce force_at(const Instance& instance, const Vec3& probe, const Vec3& velocity, ContactState& slot) noexcept {
+  if (const IsoSurface* iso = iso_of(instance.surface)) {
+    const IsoView view = felt_view(*iso, slot);
+    if (const auto* law = std::get_if<AvilaLaw>(&instance.law))
+      return avila_force(*law, *iso, view, instance.material, probe, velocity, slot);
+    return cross_uncross_force(*std::get_if<CrossUncrossLaw>(&instance.law), *iso, view, instance.material, probe,
+                               velocity, slot);
+  }
+  const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   if (const auto* law = std::get_if<HeightFieldLaw>(&instance.law)) {
     return height_field_force(*law, relief, instance.material, probe, slot);
   }
@@ -67,17 +77,103 @@ LawForce relief_force(const Instance& instance, const ReliefSurface& relief, con
 /// A law without a proxy, in the world frame.
 LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick,
                      ContactState& slot) noexcept {
-  const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   const Pose& pose = instance.world_from_object;
+  const Vec3 velocity = pose.rotate_inverse(probe.twist.linear);
   // A probe that enters within one tick was outside at the last one: ask there first.
-  if (!slot.seen_outside && !first_tick) relief_force(instance, relief, pose.apply_inverse(previous), slot);
-  LawForce law = relief_force(instance, relief, pose.apply_inverse(probe.pose.position), slot);
+  const IsoSurface* iso = iso_of(instance.surface);
+  const bool fresh = iso != nullptr ? !slot.iso.started : !slot.seen_outside;
+  if (fresh && !first_tick) force_at(instance, pose.apply_inverse(previous), velocity, slot);
+  LawForce law = force_at(instance, pose.apply_inverse(probe.pose.position), velocity, slot);
   if (!law.contact) return law;
+  if (iso != nullptr) law.element = iso->element_of(slot.iso.level, law.point);
   law.force =
       with_damping(pose.rotate(law.force), pose.rotate(law.normal), probe.twist.linear, instance.material.damping);
   law.point = pose.apply(law.point);
   law.normal = pose.rotate(law.normal);
   return law;
+}
+
+/// Every place that one tick may ask a volume about: the proxy never gets farther from the probe than it is, and both
+/// the law's searches and the gradient look a few cells around. Object frame.
+Box tick_reach(const ScalarField& field, const Pose& pose, const ProxyState& state, const Vec3& probe,
+               double probe_radius) noexcept {
+  constexpr double cells_around = 4.0;
+  double widest = 0.0;
+  const Vec3 local = pose.apply_inverse(probe);
+  for (int a = 0; a < 3; ++a) {
+    const GridAxis& axis = field.axes()[static_cast<std::size_t>(a)];
+    widest = std::max(widest, axis.width(axis.locate(local[a]).cell));
+  }
+  const double apart = std::max((state.proxy - probe).norm(), (state.previous_probe - probe).norm());
+  Box box;
+  box.include(local);
+  return box.grown(apart + 2.0 * probe_radius + cells_around * widest);
+}
+
+/// Keeps the bricks that a tick reads in place while it lasts.
+class VolumeReading {
+ public:
+  explicit VolumeReading(const Scene& scene) noexcept : scene_(scene) {
+    for_each([](const ScalarField& field) { field.enter(); });
+  }
+  ~VolumeReading() {
+    for_each([](const ScalarField& field) { field.leave(); });
+  }
+  VolumeReading(const VolumeReading&) = delete;
+  VolumeReading& operator=(const VolumeReading&) = delete;
+
+ private:
+  template <class Visit>
+  void for_each(Visit&& visit) const noexcept {
+    for (const Instance& instance : scene_.instances()) {
+      if (const IsoSurface* iso = iso_of(instance.surface)) visit(iso->field());
+    }
+    for (const FieldEffect& effect : scene_.effects()) visit(*effect.field);
+  }
+  const Scene& scene_;
+};
+
+/// The finest level at which all volumes are in memory around the probe; one for all of them, so that a replay can ask
+/// for it. Tells their streaming threads where the probe is and goes.
+int level_now(const Scene& scene, const ProxyState& state, const ProbeSample& probe, ForceSample& out) noexcept {
+  int level = 0;
+  const auto ask = [&](const ScalarField& field, const Pose& pose) {
+    if (field.bricks() == nullptr) return;
+    const Vec3& position = probe.pose.position;
+    field.bricks()->look_ahead(pose.apply_inverse(position), pose.rotate_inverse(probe.twist.linear));
+    const int finest = std::clamp(state.wanted_level, 0, field.levels() - 1);
+    const Box reach = tick_reach(field, pose, state, position, scene.probe_radius());
+    level = std::max(level, field.ready_level(reach, finest));
+  };
+  for (const Instance& instance : scene.instances()) {
+    if (const IsoSurface* iso = iso_of(instance.surface)) ask(iso->field(), instance.world_from_object);
+  }
+  for (const FieldEffect& effect : scene.effects()) ask(*effect.field, effect.world_from_object);
+  out.flags.set(TickFlag::coarse_data, level > 0);
+  out.level = static_cast<std::uint8_t>(level);
+  return level;
+}
+
+/// What is felt of volumes without a surface.
+void add_effects(const Scene& scene, int level, const ProbeSample& probe, ForceSample& out) noexcept {
+  for (const FieldEffect& effect : scene.effects()) {
+    CellPolynomial cache;
+    const int here = std::min(level, effect.field->levels() - 1);
+    const Vec3 force = field_effect_force(effect, here, probe.pose.position, probe.twist.linear, cache);
+    if (force.isZero()) continue;
+    out.flags.set(TickFlag::field_force);
+    out.wrench.force += force;
+  }
+}
+
+/// Of another scene nothing is known, except where the same volume is touched at another threshold.
+void forget_contacts(const Scene& scene, ProxyState& state) noexcept {
+  for (std::size_t i = state.contacts.size(); i-- > 0;) {
+    const ContactState& slot = state.contacts[i];
+    const IsoSurface* iso =
+        slot.instance < scene.instances().size() ? iso_of(scene.instances()[slot.instance].surface) : nullptr;
+    if (iso == nullptr || iso->field().identity() != slot.iso.field) state.contacts.swap_remove(i);
+  }
 }
 
 bool finite(const ProbeSample& probe) noexcept {
@@ -90,8 +186,24 @@ bool finite(const ProbeSample& probe) noexcept {
 
 }  // namespace
 
-ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe,
-                 [[maybe_unused]] Seconds dt) noexcept {
+Status fetch_volumes(const Scene& scene, const ProxyState& state, const ProbeSample& probe) {
+  if (!finite(probe)) return success();
+  ProxyState now = state;
+  if (now.epoch == 0) now.proxy = now.previous_probe = probe.pose.position;
+  const auto fetch = [&](const ScalarField& field, const Pose& pose) -> Status {
+    if (field.bricks() == nullptr) return success();
+    const int level = std::clamp(now.wanted_level, 0, field.levels() - 1);
+    return field.bricks()->fetch(tick_reach(field, pose, now, probe.pose.position, scene.probe_radius()), level);
+  };
+  for (const Instance& instance : scene.instances()) {
+    if (const IsoSurface* iso = iso_of(instance.surface))
+      ASPERITY_CHECK(fetch(iso->field(), instance.world_from_object));
+  }
+  for (const FieldEffect& effect : scene.effects()) ASPERITY_CHECK(fetch(*effect.field, effect.world_from_object));
+  return success();
+}
+
+ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe, Seconds dt) noexcept {
   Tick tick;
   const Vec3& position = probe.pose.position;
   if (!finite(probe)) {
@@ -102,7 +214,7 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   const bool first_tick = state.epoch == 0;
   if (first_tick) state.proxy = state.previous_probe = position;
   const bool changed = state.epoch != scene.epoch();
-  if (changed) state.contacts.clear();
+  if (changed) forget_contacts(scene, state);
   state.epoch = scene.epoch();
 
   Box reach;
@@ -110,6 +222,17 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   reach.include(state.proxy);
   reach.include(state.previous_probe);
   if (!update_slots(scene, state, reach.grown(scene.probe_radius()))) tick.out.flags.set(TickFlag::contacts_dropped);
+  const VolumeReading reading(scene);
+  const int level = level_now(scene, state, probe, tick.out);
+  bool moved = false;
+  for (ContactState& slot : state.contacts) {
+    const Instance& instance = scene.instances()[slot.instance];
+    const IsoSurface* iso = iso_of(instance.surface);
+    if (iso == nullptr) continue;
+    const Pose& pose = instance.world_from_object;
+    const int here = std::min(level, iso->field().levels() - 1);
+    moved = update_felt(*iso, instance.sides, here, dt, pose.apply_inverse(state.proxy), slot) || moved;
+  }
   // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
   const Vec3 held = state.proxy;
   if (changed && state.stiffness > 0.0) state.proxy = reacquired(scene, state);
@@ -123,10 +246,11 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
     tick.add(slot.instance, law);
     if (law.contact) shadow = law.point;
   }
-  const ProxyAnswer answer = solve_proxies(scene, state, probe, held);
+  const ProxyAnswer answer = solve_proxies(scene, state, probe, held, moved);
   state.proxy = answer.proxy;
   for (const ProxyAnswer::Part& part : answer.parts) tick.add(part.instance, part.law);
   tick.out.proxy = answer.parts.empty() ? shadow : answer.felt;
+  add_effects(scene, level, probe, tick.out);
   tick.out.flags.set(TickFlag::not_converged, !answer.converged);
   tick.out.flags.set(TickFlag::energy_limited, answer.energy_limited);
   state.previous_probe = position;

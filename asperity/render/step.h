@@ -8,6 +8,19 @@
 
 namespace asperity {
 
+/// What one probe remembers of an isosurface between ticks.
+struct IsoContact {
+  std::uint64_t field = 0;       ///< identity of the field that the rest belongs to; 0: none yet
+  double threshold = 0.0;        ///< felt now: on its way to the scene's own
+  int level = 0;                 ///< of the field, felt at the last tick
+  Vec3 point = Vec3::Zero();     ///< of the surface, while touching (object frame)
+  Vec3 normal = Vec3::Zero();    ///< unit, on the side touched; cross-uncross: the gradient saved at the crossing
+  Vec3 previous = Vec3::Zero();  ///< cross-uncross: the probe at the last tick (object frame)
+  double value = 0.0;            ///< cross-uncross: the field there
+  bool crossed = false;          ///< cross-uncross: the flag of the paper
+  bool started = false;          ///< cross-uncross: `previous` and `value` are of a tick
+};
+
 /// What one probe remembers of one instance between ticks.
 struct ContactState {
   std::uint32_t instance = no_index;
@@ -21,6 +34,7 @@ struct ContactState {
   double turn_budget = 0.0;    ///< what that has taken from the hand and not yet given back (J)
   double side = 1.0;           ///< proxy on a relief: 1 when touched from the front, -1 from the back
   ReliefPoint point;           ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
+  IsoContact iso;              ///< on an isosurface
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per
@@ -34,7 +48,14 @@ struct ProxyState {
   EnergyTank tank;
   double stiffness = 0.0;  ///< N/m of that spring as rendered at the last tick; 0: free
   bool sliding = false;    ///< several surfaces at once: friction was overcome at the last tick
+  /// Level at which volumes larger than memory are felt: -1, the finest that is in memory; 0 or more, this one, as a
+  /// replay does after having it fetched.
+  int wanted_level = -1;
 };
+
+/// Reads what the next tick may need of volumes larger than memory, at their finest level or at `state.wanted_level`,
+/// and waits for it: for runs that are not in real time, and for replays. Errors: file_truncated. [main]
+Status fetch_volumes(const Scene& scene, const ProxyState& state, const ProbeSample& probe);
 
 /// One tick: the force that the hand should feel with the probe there (N, world).
 ///

@@ -49,7 +49,9 @@ SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& 
   flags.set(TickFlag::output_not_finite, !output_good);
   const bool good = input_good && output_good;
   const bool said_inside = rendered.flags.has(TickFlag::started_inside);
-  if (!armed_ && good) armed_ = !said_inside && force.isZero(0.0);
+  // A probe that begins in a volume is where it should be: the slew limit alone keeps its force from kicking.
+  const bool field_alone = rendered.flags.has(TickFlag::field_force) && !rendered.flags.has(TickFlag::contact);
+  if (!armed_ && good) armed_ = !said_inside && (force.isZero(0.0) || field_alone);
   flags.set(TickFlag::started_inside, !armed_);
   return limit(good && armed_ ? force : Vec3(Vec3::Zero()), dt, flags);
 }

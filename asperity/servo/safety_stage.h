@@ -26,7 +26,8 @@ struct SafetyOutput {
 ///  1. probe or rendered force not finite: the target is zero (input_not_finite, output_not_finite);
 ///  2. started inside: until a tick whose rendered force is exactly zero has been seen, the target is zero
 ///     (started_inside), so that a probe that begins inside an object never gets a kick; the sample's own contact flag
-///     still tells that there is contact. A sample that itself says started_inside does not count as such a tick;
+///     still tells that there is contact. A sample that itself says started_inside does not count as such a tick; one
+///     that a volume alone pushes does: there is no inside to start from;
 ///  3. the magnitude is limited, direction kept (force_limited);
 ///  4. the change since the last tick is limited to slew_limit * dt (slew_limited). Targets of zero are reached by this
 ///     ramp as well: a sudden drop is a kick too.

@@ -13,7 +13,7 @@ constexpr double bins_per_decade = 10.0;
 constexpr double fastest_bin = 1e-8;  // s; the histogram's first edge at the lowest
 
 bool in_contact(const TraceRecord& tick) {
-  return tick.rendered.flags.has(TickFlag::contact);
+  return tick.rendered.flags.has(TickFlag::contact) || tick.rendered.flags.has(TickFlag::field_force);
 }
 
 TickMetrics measure_ticks(std::span<const TraceRecord> records, const RunSeries& series) {
@@ -217,6 +217,17 @@ EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeri
   return m;
 }
 
+FollowMetrics follow_of_run(std::span<const TraceRecord> records, const RunSeries& series) {
+  std::vector<double> errors;
+  std::vector<Vec3> path;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (!series.stroking[i]) continue;
+    errors.push_back(series.follow[i]);
+    path.push_back(records[i].probe.pose.position);
+  }
+  return measure_follow(errors, path);
+}
+
 nlohmann::json number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
@@ -236,6 +247,7 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& se
   m.spectrum = measure_spectrum(series, m.ticks);
   m.update = measure_update(series);
   m.energy = measure_energy(records, series, path, m.ticks.length);
+  m.follow = follow_of_run(records, series);
   return m;
 }
 
@@ -244,9 +256,9 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene,
 }
 
 const char* flag_name(std::size_t bit) {
-  constexpr const char* names[] = {"contact",           "not_converged",    "started_inside",
-                                   "input_not_finite",  "force_limited",    "slew_limited",
-                                   "output_not_finite", "contacts_dropped", "energy_limited"};
+  constexpr const char* names[] = {"contact",        "not_converged", "started_inside",    "input_not_finite",
+                                   "force_limited",  "slew_limited",  "output_not_finite", "contacts_dropped",
+                                   "energy_limited", "coarse_data",   "field_force"};
   return bit < std::size(names) ? names[bit] : "unknown";
 }
 
@@ -314,7 +326,14 @@ std::string metrics_json(const RunMetrics& m) {
                                  {"absorbed", number(m.energy.absorbed)},
                                  {"generated", number(m.energy.generated)},
                                  {"loops", loops},
-                                 {"mean_loop", number(m.energy.mean_loop)}}}};
+                                 {"mean_loop", number(m.energy.mean_loop)}}},
+                               {"follow",
+                                {{"samples", m.follow.samples},
+                                 {"excluded", m.follow.excluded},
+                                 {"mean", number(m.follow.mean)},
+                                 {"min", number(m.follow.min)},
+                                 {"max", number(m.follow.max)},
+                                 {"global", number(m.follow.global)}}}};
   return json.dump(2);
 }
 

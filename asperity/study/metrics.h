@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/study/follow.h"
 #include "asperity/study/series.h"
 #include "asperity/study/spectrum.h"
 
@@ -78,7 +79,7 @@ struct TickMetrics {
   double duration = 0.0;                   ///< s
   double rate = 0.0;                       ///< ticks a second (Hz)
   double length = 0.0;                     ///< distance travelled in the contact phase (m)
-  std::array<std::uint64_t, 8> flags{};    ///< by bit of TickFlag
+  std::array<std::uint64_t, 11> flags{};   ///< by bit of TickFlag
   std::uint64_t safety_interventions = 0;  ///< ticks whose commanded force is not the rendered one
   double largest_intervention = 0.0;       ///< largest |rendered - commanded| (N)
 };
@@ -92,6 +93,7 @@ struct RunMetrics {
   SpectrumMetrics spectrum;
   UpdateMetrics update;
   EnergyMetrics energy;
+  FollowMetrics follow;  ///< of the first isosurface; without samples where the scene has none
 };
 
 /// Everything above. `series` is derive_series of the same records. [main]
@@ -99,7 +101,7 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& se
 /// The same in one call. [main]
 RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path);
 
-/// "contact", "not_converged", ...: the name of flag bit `bit`, 0 to 7. [any]
+/// "contact", "not_converged", ...: the name of flag bit `bit`, 0 to 10; "unknown" beyond. [any]
 const char* flag_name(std::size_t bit);
 
 /// The numbers as JSON text, SI, without spectra and histograms; not-a-number becomes null. [main]

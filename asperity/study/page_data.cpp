@@ -21,6 +21,7 @@ constexpr double resolution = 1e-6;
 
 constexpr double milli = 1e3;
 constexpr double micro = 1e6;
+constexpr double percent = 1e2;
 constexpr double degrees = 180.0 / std::numbers::pi;
 
 /// One column on its way to the page.
@@ -177,6 +178,11 @@ json numbers(const RunMetrics& m) {
           {"absorbed_mj", significant(m.energy.absorbed * milli)},
           {"generated_mj", significant(m.energy.generated * milli)},
           {"loops_mj", loops},
+          {"follow_samples", m.follow.samples},
+          {"follow_global_percent", significant(m.follow.global * percent)},
+          {"follow_mean_percent", significant(m.follow.mean * percent)},
+          {"follow_min_percent", significant(m.follow.min * percent)},
+          {"follow_max_percent", significant(m.follow.max * percent)},
           {"mean_loop_mj", significant(m.energy.mean_loop * milli)}};
 }
 
@@ -219,8 +225,19 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
           {"height_distance", plot_rows(s, distance, heights, true, stretches)},
           {"direction_distance", plot_rows(s, distance, {{"angle", &s.direction_error, degrees}}, true, stretches)},
           {"energy_time", plot_rows(s, time, energy, false, stretches)},
+          {"follow_time",
+           m.follow.samples > 0 ? plot_rows(s, time, {{"error", &s.follow, percent}}, true, stretches) : json(nullptr)},
           {"spectrum_distance", spectrum_rows("frequency", per_millimetre(m.spectrum.normal_distance),
                                               per_millimetre(m.spectrum.tangential_distance))}};
+}
+
+/// Rows [layer in mm, speed in m/s, expected of M1, M1, M2, proxy], shares.
+json detection_data(const std::vector<DetectionRow>& rows) {
+  json data = json::array();
+  for (const DetectionRow& row : rows)
+    data.push_back({significant(row.thickness * milli), significant(row.speed), significant(row.expected),
+                    significant(row.avila), significant(row.cross_uncross), significant(row.proxy)});
+  return data;
 }
 
 }  // namespace
@@ -230,7 +247,8 @@ Status check_series(const RunSeries& series, const std::string& place) {
   const bool equal = series.distance.size() == n && series.force.size() == n && series.normal.size() == n &&
                      series.tangential.size() == n && series.followed.size() == n && series.relief.size() == n &&
                      series.direction_error.size() == n && series.work.size() == n && series.stored.size() == n &&
-                     series.update.size() == n && series.near_step.size() == n && series.stroking.size() == n;
+                     series.follow.size() == n && series.update.size() == n && series.near_step.size() == n &&
+                     series.stroking.size() == n;
   if (equal) return success();
   return Error{ErrorCode::bad_value, "has columns of different lengths", "", place, "columns with one value a tick"};
 }
@@ -256,11 +274,16 @@ json run_data(const RunReport& report) {
 json compare_data(const CompareReport& report) {
   json data = origin_data(report.origin, report.setup);
   data["kind"] = "compare";
+  const bool follows = std::any_of(report.entries.begin(), report.entries.end(),
+                                   [](const CompareEntry& entry) { return entry.metrics.follow.samples > 0; });
   data["summary"] = fmt::format(
-      "{} laws on the same scene and stroke. Direction and height errors are against the reconstructed relief; "
-      "a law that does not render relief shows it here.",
-      report.entries.size());
+      "{} laws on the same scene and stroke. Direction and height errors are against {}", report.entries.size(),
+      follows
+          ? "the isosurface; the follow error is of the probe itself, so it grows with the force and falls with the "
+            "stiffness."
+          : "the reconstructed relief; a law that does not render relief shows it here.");
   data["picture"] = picture_data(report.picture);
+  data["detection"] = detection_data(report.detection);
   data["laws"] = json::array();
   const std::size_t stretches = std::max(fewest_stretches, compare_stretches / report.entries.size());
   for (const CompareEntry& entry : report.entries)

@@ -42,11 +42,24 @@ void add_corners(const Box& box, std::vector<Vec3>& points) {
   }
 }
 
+/// What there is to see: of a volume its isosurface alone.
+Box visible_bounds(const Scene& scene) {
+  Box all;
+  for (std::size_t i = 0; i < scene.instances().size(); ++i) {
+    const Instance& instance = scene.instances()[i];
+    std::vector<Vec3> corners;
+    const IsoSurface* iso = iso_of(instance.surface);
+    add_corners(iso != nullptr ? iso->surface_bounds() : scene.world_bounds(i), corners);
+    for (const Vec3& corner : corners) all.include(iso != nullptr ? instance.world_from_object.apply(corner) : corner);
+  }
+  return all;
+}
+
 /// What the view has to hold: the whole scene, or the surroundings of a stroke that is small in it.
 std::vector<Vec3> framing_points(const Scene& scene, const StrokePath& path) {
   Box stroke;
   for (const Vec3& point : path.points()) stroke.include(point);
-  const Box all = scene.world_bounds();
+  const Box all = visible_bounds(scene);
   std::vector<Vec3> points;
   if (stroke.diagonal() < small_stroke * all.diagonal()) {
     const Box around = stroke.grown(surroundings * stroke.diagonal());
@@ -54,6 +67,12 @@ std::vector<Vec3> framing_points(const Scene& scene, const StrokePath& path) {
     return points;
   }
   for (const Instance& instance : scene.instances()) {
+    if (const IsoSurface* iso = iso_of(instance.surface)) {
+      std::vector<Vec3> corners;
+      add_corners(iso->surface_bounds(), corners);
+      for (const Vec3& corner : corners) points.push_back(instance.world_from_object.apply(corner));
+      continue;
+    }
     const auto positions = base_mesh(instance.surface).positions();
     const std::size_t stride = positions.size() / most_framing_points + 1;
     for (std::size_t i = 0; i < positions.size(); i += stride)

@@ -50,6 +50,15 @@ Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& dire
   return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
 }
 
+/// First touch of an isosurface by the ray's parameter, from the sides that can be touched.
+Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  const Segment motion{origin + part.from * direction, origin + part.to * direction};
+  const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
+  if (!hit.hit) return {};
+  return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
+}
+
 /// Whether a point over an open mesh lies beside its rim: the implicit relief goes on there, what is felt does not.
 bool beside_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
   const Foot foot = surface.base().closest(point, infinity, hint);
@@ -208,7 +217,8 @@ Pixel RayCaster::cast(double x, double y) {
     const Instance& instance = scene_->instances()[i];
     const Vec3 from = instance.world_from_object.apply_inverse(camera_->eye);
     const Vec3 along = instance.world_from_object.rotate_inverse(direction);
-    const Box bounds = surface_bounds(instance.surface);
+    const IsoSurface* iso = iso_of(instance.surface);
+    const Box bounds = iso != nullptr ? iso->surface_bounds() : surface_bounds(instance.surface);
     Interval part = clip(from, along, bounds.grown(1e-3 * bounds.diagonal()));
     part.to = std::min(part.to, nearest.depth);
     if (part.from >= part.to) continue;

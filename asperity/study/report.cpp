@@ -102,6 +102,10 @@ std::string height_words(const RunMetrics& m) {
   return fmt::format("stayed on the surface to within {} RMS", length_words(m.height.rms_error));
 }
 
+std::string follow_words(const FollowMetrics& follow) {
+  return fmt::format("follow error {}, at most {}", share(follow.global), share(follow.max));
+}
+
 /// Energies within this share of what the contact took up are rounding and sampling, not activity.
 bool passive(const EnergyMetrics& energy) {
   return energy.generated <= 1e-3 * energy.absorbed + 1e-9;
@@ -116,6 +120,12 @@ std::string summarise(const RunReport& report) {
   if (m.ticks.contact == 0) return text + "Nothing was touched: no force was felt.";
   text += fmt::format("The probe travelled {:.3g} mm and felt {:.3g} N on average, {:.3g} N at most. It {}. ",
                       1e3 * m.ticks.length, m.force.mean, m.force.max, height_words(m));
+  if (m.follow.samples > 0) {
+    text += fmt::format(
+        "Its follow error, the way it strayed from the isosurface's value, was {} of the volume's largest "
+        "difference, {} at the most. ",
+        share(m.follow.global), share(m.follow.max));
+  }
   text += passive(m.energy)
               ? "The contact gave back no more energy than it had taken. "
               : fmt::format("The contact gave back {:.3g} mJ more than it had taken. ", 1e3 * m.energy.generated);
@@ -131,6 +141,7 @@ std::string verdict(const RunMetrics& m) {
   std::string text =
       m.height.samples == 0
           ? std::string(m.height.excluded > 0 ? "contact only within a texel of steps" : "no contact along the stroke")
+      : m.follow.samples > 0      ? follow_words(m.follow)
       : m.height.amplitude <= 0.0 ? std::string("no relief to follow")
                                   : fmt::format("height error {} of the relief", share(m.height.relative_error));
   if (m.height.amplitude > 0.0 && m.height.excursion < 0.05 * m.height.amplitude) text += "; renders no height";

@@ -52,6 +52,7 @@ struct CompareReport {
   std::vector<ReportFact> setup;
   std::vector<CompareEntry> entries;
   std::optional<Picture> picture;
+  std::vector<DetectionRow> detection;  ///< who notices a thin layer; empty where no isosurface is touched
 };
 
 /// One paragraph in plain words: how long, how strong, how true, how safe. For the page and the terminal. [main]

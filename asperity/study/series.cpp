@@ -6,6 +6,8 @@
 #include <memory>
 #include <variant>
 
+#include "asperity/study/follow.h"
+
 namespace asperity {
 namespace {
 
@@ -19,11 +21,6 @@ constexpr double least_force = 1e-3;
 const Coat* coat_of(const Surface& surface) {
   const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface);
   return relief ? &(*relief)->coat() : nullptr;
-}
-
-const MeshSurface& base_of(const Surface& surface) {
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return (*relief)->base();
-  return **std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
 }
 
 /// The base mesh under a felt point, object frame.
@@ -70,9 +67,12 @@ bool step_along(const TriangleMesh& mesh, const Coat& coat, const BasePoint& at,
 class SeriesBuilder {
  public:
   SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks)
-      : scene_(scene), path_(path), hints_(std::make_unique<Hint[]>(scene.instances().size())) {
+      : scene_(scene),
+        path_(path),
+        hints_(std::make_unique<Hint[]>(scene.instances().size())),
+        followed_(followed_instance(scene)) {
     for (auto* column : {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.followed,
-                         &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.update}) {
+                         &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.follow, &out_.update}) {
       column->reserve(ticks);
     }
   }
@@ -88,6 +88,10 @@ class SeriesBuilder {
     out_.normal.push_back(tick.commanded.dot(pose.normal));
     out_.tangential.push_back(tick.commanded.dot(pose.tangent));
     out_.update.push_back(tick.update_seconds);
+    out_.follow.push_back(followed_ == nullptr
+                              ? nan
+                              : follow_error(*iso_of(followed_->surface),
+                                             followed_->world_from_object.apply_inverse(position), follow_hint_));
     add_energy(tick);
     add_surface(tick, pose.tangent);
     last_ = &tick;
@@ -111,7 +115,11 @@ class SeriesBuilder {
     out_.work.push_back(work_);
     const Instance* instance = touched(tick);
     const double depth = tick.rendered.contact.penetration;
-    out_.stored.push_back(instance ? 0.5 * instance->material.stiffness * depth * depth : 0.0);
+    double push = instance ? instance->material.stiffness * depth : 0.0;
+    // M1's layer is as stiff as the field is steep.
+    if (instance && std::holds_alternative<AvilaLaw>(instance->law))
+      push = std::max(0.0, tick.rendered.wrench.force.dot(tick.rendered.contact.normal));
+    out_.stored.push_back(0.5 * push * depth);
   }
 
   void add_surface(const TraceRecord& tick, const Vec3& tangent) {
@@ -121,8 +129,12 @@ class SeriesBuilder {
     out_.near_step.push_back(0);
     const Instance* instance = touched(tick);
     if (!instance) return;
+    if (iso_of(instance->surface) != nullptr) {
+      add_isosurface(*instance, tick);
+      return;
+    }
     const Pose& pose = instance->world_from_object;
-    const MeshSurface& base = base_of(instance->surface);
+    const MeshSurface& base = *base_of(instance->surface);
     const bool proxied = constrains(instance->law);
     const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
     Hint& hint = hints_[tick.rendered.contact.instance];
@@ -138,6 +150,28 @@ class SeriesBuilder {
           step_along(base.mesh(), *coat, at, along) || step_along(base.mesh(), *coat, at, along.cross(at.up));
       out_.near_step.back() = near ? 1 : 0;
     }
+  }
+
+  void add_isosurface(const Instance& instance, const TraceRecord& tick) {
+    const IsoSurface& surface = *iso_of(instance.surface);
+    const Pose& pose = instance.world_from_object;
+    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const bool proxied = constrains(instance.law);
+    const Vec3 felt = proxied
+                          ? pose.apply_inverse(tick.rendered.proxy)
+                          : Vec3(pose.apply_inverse(tick.probe.pose.position) + force / instance.material.stiffness);
+    Hint& hint = hints_[tick.rendered.contact.instance];
+    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
+    if (!foot.found()) return;
+    Vec3 outward = surface.view().outward(foot.point, hint.iso);
+    const double side = (felt - foot.point).dot(outward) < 0.0 ? -1.0 : 1.0;
+    // The proxy is also held from the inside.
+    const bool from_behind = proxied && force.dot(outward) < 0.0;
+    out_.followed.back() = (from_behind ? -side : side) * foot.distance - scene_.probe_radius();
+    out_.relief.back() = 0.0;
+    if (!(force.norm() >= least_force) || outward.isZero()) return;
+    if (from_behind) outward = -outward;
+    out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
   }
 
   /// On a coat the shell's coordinates say what is under a point, where its shell reaches.
@@ -162,7 +196,7 @@ class SeriesBuilder {
 
   void add_height(const Instance& instance, const BasePoint& at, double deflection, const Vec3& force) {
     const Coat* coat = coat_of(instance.surface);
-    const TriangleMesh& mesh = base_of(instance.surface).mesh();
+    const TriangleMesh& mesh = base_mesh(instance.surface);
     const bool from_behind = force.dot(mesh.face_normal(at.face)) < 0.0 && !coat;
     const double height = from_behind ? -at.height : at.height;
     out_.followed.back() = height + deflection - scene_.probe_radius();
@@ -171,7 +205,7 @@ class SeriesBuilder {
 
   void add_direction(const Instance& instance, const BasePoint& at, const Vec3& force) {
     if (!(force.norm() >= least_force)) return;
-    const TriangleMesh& mesh = base_of(instance.surface).mesh();
+    const TriangleMesh& mesh = base_mesh(instance.surface);
     Vec3 reference = mesh.face_normal(at.face);
     if (coat_of(instance.surface) != nullptr) {
       reference = at.slope;
@@ -187,6 +221,8 @@ class SeriesBuilder {
   const Scene& scene_;
   const StrokePath& path_;
   std::unique_ptr<Hint[]> hints_;
+  const Instance* followed_ = nullptr;
+  IsoHint follow_hint_;
   RunSeries out_;
   const TraceRecord* last_ = nullptr;
   double work_ = 0.0;

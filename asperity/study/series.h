@@ -24,6 +24,11 @@ namespace asperity {
 /// reference    normal of the reconstructed relief at the base point, n - grad H; the face's own on a bare mesh, turned
 /// to
 ///              the touched side
+/// follow       follow error of the probe (FollowMetrics), of the first isosurface of the scene
+///
+/// On an isosurface there is no base: followed is the signed distance of the felt point from the isosurface (negative
+/// inside), relief is 0, reference is the isosurface's normal at the point of it nearest to the felt one. Laws without
+/// a proxy are felt at probe + F / k.
 struct RunSeries {
   std::vector<double> time;  ///< s
   std::vector<double>
@@ -36,7 +41,9 @@ struct RunSeries {
   std::vector<double> direction_error;  ///< angle of the rendered force to the reference normal (rad); from 1 mN on
   std::vector<double>
       work;  ///< done on the probe so far by the commanded force (J), trapezoid; positive: fed into the hand
-  std::vector<double> stored;   ///< energy in the spring of the strongest contact, k penetration^2 / 2 (J)
+  std::vector<double>
+      stored;  ///< energy in the spring of the strongest contact, k penetration^2 / 2; of M1 F . n penetration / 2 (J)
+  std::vector<double> follow;   ///< 0 to 1; not-a-number outside the volume and without an isosurface
   std::vector<double> update;   ///< time that `step` took (s)
   std::vector<char> near_step;  ///< 1 or 0
   std::vector<char> stroking;   ///< 1 in the stroke's contact phase

@@ -43,7 +43,8 @@ std::vector<std::vector<FeltPoint>> felt_stretches(const Camera& camera, std::sp
   bool open = false;
   std::size_t since = 0;
   for (const TraceRecord& tick : records) {
-    if (!tick.rendered.flags.has(TickFlag::contact) || !tick.rendered.proxy.allFinite()) {
+    const bool felt = tick.rendered.flags.has(TickFlag::contact) || tick.rendered.flags.has(TickFlag::field_force);
+    if (!felt || !tick.rendered.proxy.allFinite()) {
       open = false;
       continue;
     }

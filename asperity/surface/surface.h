@@ -7,17 +7,28 @@
 #include <variant>
 
 #include "asperity/core/math.h"
+#include "asperity/field/cell_polynomial.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/triangle_patch.h"
 #include "asperity/surface/relief_frame.h"
 
 namespace asperity {
 
+/// What a query of an isosurface remembers: the last two cells, and the nearest point found last.
+struct IsoHint {
+  CellPolynomial cell;
+  CellPolynomial other;
+  bool other_last = false;  ///< `other` was used after `cell`
+  Vec3 foot = Vec3::Zero();
+  bool has_foot = false;
+};
+
 /// What a query remembers of the last one. A cache in the caller's hands: re-validated by the provider that reads it,
 /// never trusted, free to be thrown away. One per probe and instance. [servo]
 struct Hint {
   TrianglePatch patch;
   ReliefPlace relief;
+  IsoHint iso;
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.

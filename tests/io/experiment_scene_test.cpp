@@ -236,9 +236,10 @@ TEST_F(ExperimentScene, BuiltinScenesReadAndTouch) {
       const StrokePose pose = e.path.pose(Seconds(tick * 1e-3));
       ProbeSample probe;
       probe.pose.position = pose.target;
+      probe.twist.linear = pose.velocity;
       const ForceSample force = step(e.scene, state, probe, Seconds(1e-3));
       EXPECT_TRUE(force.wrench.force.allFinite());
-      touched = touched || force.flags.has(TickFlag::contact);
+      touched = touched || force.flags.has(TickFlag::contact) || force.flags.has(TickFlag::field_force);
     }
     EXPECT_TRUE(touched) << scene.name;
     EXPECT_LT(e.path.duration().count(), 20.0) << scene.name;

@@ -13,7 +13,9 @@
 #include <valijson/validation_results.hpp>
 #include <valijson/validator.hpp>
 
+#include "asperity/field/brick_file.h"
 #include "asperity/io/scene_json.h"
+#include "asperity/io/volume_io.h"
 #include "tests/io/experiment_fixture.h"
 
 namespace asperity {
@@ -74,6 +76,12 @@ TEST_F(ExperimentSchema, ItRefusesWhatTheReaderRefuses) {
   for (const char* scene : {
            R"({})",
            R"({"surfaces":[]})",
+           R"({"effects":[]})",
+           R"({"surfaces":[{}]})",
+           R"({"surfaces":[{"volume":{"generator":"sphre"}}]})",
+           R"({"surfaces":[{"volume":{"generator":"sphere","size":[1,8,8]}}]})",
+           R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity"}]})",
+           R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity","transfer":[[0]]}]})",
            R"({"surfaces":[{"mesh":3}]})",
            R"({"surfaces":[{"mesh":"a.obj","colour":"red"}]})",
            R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})",
@@ -163,6 +171,30 @@ const Host hosts[] = {
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"height-field"}}]})"},
     {"law", "/surfaces/0/law",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"generated-geometry"}}]})"},
+    {"surface", "/surfaces/0",
+     R"({"surfaces":[{"volume":{"generator":"sphere","size":[8,8,8]},"iso":{"threshold":0}}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"file":"cube.json"},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"file":"cube.aspvol"},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"generator":"shells","size":[16,16,16]},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"generator":"waves","size":[16,8,8]},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"generator":"ramp","size":[8,8,8]},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"generator":"sphere","size":[8,8,8]},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"volume", "/effects/0/volume",
+     R"({"effects":[{"volume":{"generator":"cavity","size":[8,8,8],"derive":"vorticity_magnitude"},"type":"viscosity","transfer":[[0,1]]}]})"},
+    {"iso", "/surfaces/0/iso", R"({"surfaces":[{"volume":{"generator":"sphere","size":[8,8,8]},"iso":{}}]})"},
+    {"effect", "/effects/0", R"({"effects":[{"volume":"cube.json","type":"iwata","transfer":[[0,1]]}]})"},
+    {"effect", "/effects/0", R"({"effects":[{"volume":"cube.json","type":"pao","transfer":[[0,1]]}]})"},
+    {"effect", "/effects/0", R"({"effects":[{"volume":"cube.json","type":"gravity-scalars","transfer":[[0,1]]}]})"},
+    {"law", "/surfaces/0/law",
+     R"({"surfaces":[{"volume":{"generator":"sphere","size":[8,8,8]},"iso":{"threshold":0},"law":{"type":"avila"}}]})"},
+    {"law", "/surfaces/0/law",
+     R"({"surfaces":[{"volume":{"generator":"sphere","size":[8,8,8]},"iso":{"threshold":0},"law":{"type":"cross-uncross-literal"}}]})"},
     {"blend map", "/surfaces/0/law/blend",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"mesostructure-literal","blend":{"image":"map.png"}}}]})"},
     {"material", "/surfaces/0/material", R"({"surfaces":[{"mesh":{"generator":"box"},"material":{}}]})"},
@@ -183,6 +215,11 @@ const Host hosts[] = {
 
 TEST_F(ExperimentSchema, EveryKeyIsReallyRead) {
   write("path.csv", "time,x,y,z\n0,0,0.05,0\n1,0.01,0.05,0\n");
+  write("cube.json", R"({"asperity_volume":1,"file":"cube.raw","size":[2,2,2],"type":"uint8","byte_order":"little"})");
+  write("cube.raw", std::string("\0\0\0\0\3\3\3\3", 8));
+  const Result<VolumeSource> cube = read_volume(folder_ / "cube.json");
+  ASSERT_TRUE(cube.ok());
+  ASSERT_TRUE(write_brick_file(folder_ / "cube.aspvol", *std::get_if<ScalarGrid>(&cube->data)).ok());
   for (const SceneObjectKeys& entry : scene_object_keys()) {
     for (const std::string& key : entry.keys) {
       bool read = false;

@@ -30,6 +30,15 @@ inline Law named(std::string_view name) {
   return must(law_by_name(name));
 }
 
+/// Names of the laws that can be felt on a relief.
+inline std::vector<std::string> relief_laws() {
+  std::vector<std::string> names;
+  for (const std::string& name : law_names()) {
+    if (!needs_field(named(name))) names.push_back(name);
+  }
+  return names;
+}
+
 inline ProbeSample probe_at(const Vec3& position) {
   ProbeSample probe;
   probe.pose.position = position;

@@ -111,7 +111,7 @@ bool faceted(const std::string& name) {
 /// Every law on one coated thing.
 std::vector<std::pair<std::string, Scene>> scenes_of_every_law(const std::shared_ptr<const ReliefSurface>& surface) {
   std::vector<std::pair<std::string, Scene>> scenes;
-  for (const std::string& name : law_names()) scenes.emplace_back(name, scene_of(surface, named(name)));
+  for (const std::string& name : relief_laws()) scenes.emplace_back(name, scene_of(surface, named(name)));
   return scenes;
 }
 
@@ -213,7 +213,7 @@ TEST(FlatPlane, lateral_force_of_the_god_object_is_rounding_on_a_tilted_one) {
 TEST(CutPlane, feels_the_same_in_2_to_32768_triangles_within_a_tenth_of_a_degree) {
   const HeightMap map = wavy_map(5e-4);
   const double tenth = 0.1 * std::numbers::pi / 180.0;
-  for (const std::string& name : law_names()) {
+  for (const std::string& name : relief_laws()) {
     if (name == "height-field-literal") continue;  // heights fall to 0 at every edge: see the next test
     if (faceted(name)) continue;
     const auto scene_with = [&](std::uint32_t triangles) {
@@ -267,7 +267,7 @@ std::vector<Vec3> path_around_sphere() {
 }
 
 TEST(Units, a_mesh_in_millimetres_feels_as_the_same_mesh_in_metres) {
-  for (const std::string& name : law_names()) {
+  for (const std::string& name : relief_laws()) {
     if (faceted(name)) continue;
     const Scene metres = scene_of(coated(icosphere(2, 0.02), wavy_map(5e-4), Mapping::triplanar), named(name));
     const Scene millimetres =

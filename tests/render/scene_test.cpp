@@ -136,7 +136,7 @@ TEST(SceneTest, world_bounds_hold_the_turned_relief) {
 
 TEST(SceneTest, a_moved_and_turned_instance_feels_as_one_at_the_origin) {
   Rng rng(3);
-  for (const std::string& name : law_names()) {
+  for (const std::string& name : relief_laws()) {
     Instance instance = good(named(name));
     instance.surface = coated(plane_grid(0.04, 0.04, 4, 4), wavy_map(5e-4), Mapping::uv);
     const Scene here = must(Scene::build({instance}, 0.0));

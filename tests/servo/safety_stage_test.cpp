@@ -173,5 +173,19 @@ TEST(SafetyStage, EveryBuiltInProfileGivesAStage) {
   }
 }
 
+TEST(SafetyStage, AVolumesForceIsNoStartInside) {
+  SafetyStage stage = SafetyStage::build({}).value();
+  ForceSample rendered;
+  rendered.wrench.force = Vec3(0.0, 0.0, 0.5);
+  rendered.flags.set(TickFlag::field_force);
+  EXPECT_FALSE(stage.apply(rendered, {}, Seconds(1.0)).flags.has(TickFlag::started_inside));
+  EXPECT_NEAR(stage.last_force().z(), 0.5, 1e-12);
+  // With a surface that pushes as well, it is one.
+  SafetyStage other = SafetyStage::build({}).value();
+  rendered.flags.set(TickFlag::contact);
+  EXPECT_TRUE(other.apply(rendered, {}, Seconds(1.0)).flags.has(TickFlag::started_inside));
+  EXPECT_TRUE(other.last_force().isZero());
+}
+
 }  // namespace
 }  // namespace asperity

@@ -87,6 +87,22 @@ TEST_F(ReportPage, ComparePageDrawsEveryPlot) {
   EXPECT_NE(dom.find("height-field-literal"), std::string::npos);
 }
 
+TEST_F(ReportPage, PagesOfVolumesDrawTheFollowErrorAndTheDetection) {
+  const CompareReport compared = volume_report("a volume");
+  const auto file = folder_ / "volumes.html";
+  ASSERT_TRUE(write_compare_report(file, compared).ok());
+  const std::string dom = opened(file);
+  expect_drawn(dom, 9);
+  EXPECT_NE(dom.find("Follow error over time"), std::string::npos);
+  EXPECT_NE(dom.find("Detected over speed"), std::string::npos);
+
+  RunReport report = run_report("a volume");
+  report.series = compared.entries[1].series;
+  report.metrics = compared.entries[1].metrics;
+  ASSERT_TRUE(write_run_report(file, report).ok());
+  expect_drawn(opened(file), 8);
+}
+
 TEST_F(ReportPage, HostileNamesRunNoScript) {
   const std::string hostile =
       "</script><script>document.body.dataset.error='ran'</script><img src=x "

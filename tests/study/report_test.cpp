@@ -108,8 +108,8 @@ TEST(RunReport, LongRunsAreThinnedAndKeepTheirExtremes) {
     s.time.push_back(t);
     s.distance.push_back(1e-5 * static_cast<double>(i));
     s.normal.push_back(i == 123456 ? 9.75 : 1.0 + 0.3 * std::sin(t));
-    for (auto* column :
-         {&s.force, &s.tangential, &s.followed, &s.relief, &s.direction_error, &s.work, &s.stored, &s.update})
+    for (auto* column : {&s.force, &s.tangential, &s.followed, &s.relief, &s.direction_error, &s.work, &s.stored,
+                         &s.follow, &s.update})
       column->push_back(0.1 * std::cos(t));
     s.near_step.push_back(0);
     s.stroking.push_back(1);
@@ -148,14 +148,33 @@ TEST(CompareReport, HoldsEveryLawWithItsVerdict) {
   const auto html = compare_report_html(report);
   ASSERT_TRUE(html.ok());
   const auto data = data_of(*html);
-  ASSERT_EQ(data["laws"].size(), law_names().size());
-  for (std::size_t i = 0; i < law_names().size(); ++i) {
-    EXPECT_EQ(data["laws"][i]["law"], law_names()[i]);
+  const std::vector<std::string> names = relief_laws();
+  ASSERT_EQ(data["laws"].size(), names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_EQ(data["laws"][i]["law"], names[i]);
     EXPECT_EQ(data["laws"][i]["verdict"], verdict(report.entries[i].metrics));
   }
-  ASSERT_EQ(law_names()[1], "god-object");
+  ASSERT_EQ(names[1], "god-object");
   EXPECT_NE(verdict(report.entries[1].metrics).find("renders no height"), std::string::npos);
   EXPECT_LT(html->size(), 5u << 20U);
+}
+
+TEST(CompareReport, HoldsFollowErrorsAndDetectionOfAVolume) {
+  const CompareReport report = volume_report("a volume");
+  const auto html = compare_report_html(report);
+  ASSERT_TRUE(html.ok());
+  const auto data = data_of(*html);
+  ASSERT_EQ(data["laws"].size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& law = data["laws"][i];
+    // 1 mm of 30 mm.
+    EXPECT_NEAR(law["numbers"]["follow_global_percent"].get<double>(), 100.0 / 30.0, 0.01);
+    EXPECT_GT(law["follow_time"]["rows"].size(), 100u);
+    EXPECT_NE(law["verdict"].get<std::string>().find("follow error 3.3 %"), std::string::npos);
+  }
+  ASSERT_EQ(data["detection"].size(), report.detection.size());
+  EXPECT_EQ(data["detection"][0][4], 1.0);
+  EXPECT_TRUE(data_of(*compare_report_html(compare_report("laws")))["laws"][0]["follow_time"].is_null());
 }
 
 TEST(CompareReport, NothingToCompareIsRefused) {

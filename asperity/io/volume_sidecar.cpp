@@ -1,0 +1,293 @@
+// Raw samples and the JSON file that tells what they are.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <new>
+
+#include "asperity/io/scene_json.h"
+#include "asperity/io/volume_assembly.h"
+
+namespace asperity {
+namespace {
+
+namespace fs = std::filesystem;
+using volume_assembly::RawVolume;
+
+constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
+constexpr std::uint64_t most_nodes = 1U << 20U;  // along an axis: 1e6 nodes of 8 bytes, before any sample is looked at
+
+const std::vector<std::string> sidecar_keys{"asperity_volume", "file", "size",       "type",  "byte_order",  "origin",
+                                            "spacing",         "axes", "components", "array", "association", "unit"};
+
+/// What a sidecar says.
+struct Sidecar {
+  std::string file;
+  std::array<std::uint64_t, 3> size{};
+  SampleType type = SampleType::float32;
+  bool big_endian = false;
+  RawVolume raw;
+  std::size_t samples = 0;  ///< tuples
+};
+
+void read_size(ObjectReader& reader, Sidecar& sidecar) {
+  const char* accepted = "three whole numbers of samples, 1 or more, along x, y, z";
+  const SceneJson* size = reader.raw("size");
+  if (size == nullptr) return reader.fail("size", "is missing", accepted);
+  if (!size->is_array()) return reader.fail_type("size", *size, accepted);
+  if (size->size() != 3) return reader.fail("size", fmt::format("has {} numbers", size->size()), accepted);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::string place = fmt::format("{}[{}]", reader.place_of("size"), a);
+    const SceneJson& n = (*size)[a];
+    if (!n.is_number()) {
+      return reader.fail(
+          Error{ErrorCode::bad_type, fmt::format("is {}", json_type(n)), {}, place, "a whole number of samples"});
+    }
+    if (!n.is_number_unsigned() || n.get<std::uint64_t>() == 0 || n.get<std::uint64_t>() > most_nodes) {
+      return reader.fail(Error{ErrorCode::bad_value,
+                               fmt::format("is {}", n.dump()),
+                               {},
+                               place,
+                               fmt::format("a whole number, 1 to {}", most_nodes)});
+    }
+    sidecar.size[a] = n.get<std::uint64_t>();
+  }
+}
+
+/// Three numbers at `key`; `above_zero` for spacings.
+Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, bool above_zero) {
+  const char* accepted = above_zero ? "three numbers above 0" : "three numbers";
+  const SceneJson* value = reader.raw(key);
+  if (value == nullptr) return fallback;
+  if (!value->is_array()) {
+    reader.fail_type(key, *value, accepted);
+    return fallback;
+  }
+  if (value->size() != 3) {
+    reader.fail(key, fmt::format("has {} numbers", value->size()), accepted);
+    return fallback;
+  }
+  Vec3 numbers;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const SceneJson& number = (*value)[a];
+    const std::string place = fmt::format("{}[{}]", reader.place_of(key), a);
+    if (!number.is_number()) {
+      reader.fail(Error{ErrorCode::bad_type, fmt::format("is {}", json_type(number)), {}, place, accepted});
+      return fallback;
+    }
+    const auto read = number.get<double>();
+    if (!std::isfinite(read) || (above_zero && !(read > 0.0))) {
+      reader.fail(
+          Error{ErrorCode::bad_value, fmt::format("is {:g} (axis {})", read, axis_names[a]), {}, place, accepted});
+      return fallback;
+    }
+    numbers[static_cast<int>(a)] = read;
+  }
+  return numbers;
+}
+
+void read_axis(ObjectReader& reader, const SceneJson& json, std::size_t count, const std::string& place,
+               std::vector<double>& nodes) {
+  const auto bad = [&](ErrorCode code, std::string what, const std::string& where) {
+    reader.fail(Error{code, std::move(what), {}, where, fmt::format("an array of {} coordinates", count)});
+  };
+  if (!json.is_array()) return bad(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place);
+  if (json.size() != count) return bad(ErrorCode::bad_value, fmt::format("has {} coordinates", json.size()), place);
+  nodes.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!json[i].is_number())
+      return bad(ErrorCode::bad_type, fmt::format("is {}", json_type(json[i])), fmt::format("{}[{}]", place, i));
+    nodes.push_back(json[i].get<double>());
+  }
+}
+
+void read_places(ObjectReader& reader, Sidecar& sidecar) {
+  const std::size_t more = sidecar.raw.cell_data ? 1 : 0;
+  const SceneJson* axes = reader.raw("axes");
+  if (axes == nullptr) {
+    const Vec3 spacing = three_numbers(reader, "spacing", Vec3::Ones(), true);
+    const Vec3 origin = three_numbers(reader, "origin", Vec3::Zero(), false);
+    for (std::size_t a = 0; a < 3 && !reader.failed(); ++a) {
+      const auto along = static_cast<int>(a);
+      sidecar.raw.nodes[a] = volume_assembly::even_nodes(origin[along], spacing[along], sidecar.size[a] + more);
+    }
+    return;
+  }
+  reader.refuse({"spacing", "origin"}, "beside \"axes\"");
+  if (reader.failed()) return;
+  static const std::vector<std::string> keys{"x", "y", "z"};
+  ObjectReader axes_reader(*axes, reader.place_of("axes"), "sidecar's axes", keys);
+  for (std::size_t a = 0; a < 3 && !axes_reader.failed(); ++a) {
+    const SceneJson* axis = axes_reader.raw(axis_names[a]);
+    if (axis == nullptr) {
+      axes_reader.fail(axis_names[a], "is missing", "an array of coordinates");
+    } else {
+      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(axis_names[a]), sidecar.raw.nodes[a]);
+    }
+  }
+  reader.take("axes", std::move(axes_reader));
+}
+
+/// Everything but the samples, checked against `most_bytes` before anything of their size is made.
+Result<Sidecar> read_description(std::string_view text, const std::string& name, const VolumeRequest& request) {
+  static const std::vector<std::string> types{"float32", "int16", "uint8"};
+  static const std::vector<std::string> orders{"little", "big"};
+  static const std::vector<std::string> associations{"node", "cell"};
+  ASPERITY_TRY(const SceneJson json, parse_scene_json(text, name));
+  ObjectReader reader(json, "", "volume's sidecar", sidecar_keys);
+  if (!reader.failed() && !reader.has("asperity_volume"))
+    reader.fail("asperity_volume", "is missing", "1, the version of the sidecar's format");
+  const int version = reader.integer("asperity_volume", 1, 1, 1000000);
+  if (version != 1) {
+    reader.fail("asperity_volume", fmt::format("is {}, a newer format than this program reads", version), "1",
+                ErrorCode::file_unsupported);
+  }
+  Sidecar sidecar;
+  sidecar.file = reader.text("file", "");
+  if (sidecar.file.empty()) reader.fail("file", "is missing", "the file of raw samples");
+  if (!reader.failed()) read_size(reader, sidecar);
+  for (const char* key : {"type", "byte_order"}) {
+    if (!reader.has(key)) reader.fail(key, "is missing", "the samples' type and byte order");
+  }
+  sidecar.type = static_cast<SampleType>(reader.choice("type", types, 0));
+  sidecar.big_endian = reader.choice("byte_order", orders, 0) == 1;
+  sidecar.raw.components = reader.integer("components", 1, 1, 3);
+  if (sidecar.raw.components == 2) reader.fail("components", "is 2", "1 or 3");
+  sidecar.raw.cell_data = reader.choice("association", associations, 0) == 1;
+  sidecar.raw.array = reader.text("array", fs::path(sidecar.file).stem().string());
+  sidecar.raw.unit = reader.text("unit", "");
+  ASPERITY_CHECK(reader.status());
+  Result<std::size_t> count = volume_assembly::sample_count(
+      sidecar.size, sample_bytes(sidecar.type) * static_cast<std::size_t>(sidecar.raw.components), request.most_bytes);
+  if (!count) return std::move(count).error().at("size");
+  sidecar.samples = *count;
+  read_places(reader, sidecar);
+  ASPERITY_CHECK(reader.status());
+  return sidecar;
+}
+
+std::size_t declared_bytes(const Sidecar& sidecar) {
+  return sidecar.samples * static_cast<std::size_t>(sidecar.raw.components) * sample_bytes(sidecar.type);
+}
+
+Status check_length(const Sidecar& sidecar, std::uint64_t held, const std::string& file) {
+  const std::size_t declared = declared_bytes(sidecar);
+  if (held == declared) return success();
+  return Error{held < declared ? ErrorCode::file_truncated : ErrorCode::file_malformed,
+               fmt::format("has {} bytes; its sidecar declares {} x {} x {} samples, {} bytes", held, sidecar.size[0],
+                           sidecar.size[1], sidecar.size[2], declared),
+               file, held < declared ? fmt::format("byte {}", held) : fmt::format("byte {}", declared),
+               "a file of exactly the declared size"};
+}
+
+template <class T>
+void swap_bytes(std::vector<T>& samples) {
+  for (T& sample : samples) {
+    auto raw = std::bit_cast<std::array<std::byte, sizeof(T)>>(sample);
+    std::reverse(raw.begin(), raw.end());
+    sample = std::bit_cast<T>(raw);
+  }
+}
+
+/// Room for the samples, filled by `fill(pointer, bytes)`.
+template <class Fill>
+Result<SampleArray> load_samples(const Sidecar& sidecar, Fill&& fill) {
+  const std::size_t count = sidecar.samples * static_cast<std::size_t>(sidecar.raw.components);
+  SampleArray samples;
+  switch (sidecar.type) {
+    case SampleType::float32: samples = std::vector<float>(count); break;
+    case SampleType::int16: samples = std::vector<std::int16_t>(count); break;
+    case SampleType::uint8: samples = std::vector<std::uint8_t>(count); break;
+  }
+  Status filled = std::visit(
+      [&](auto& values) -> Status {
+        ASPERITY_CHECK(fill(reinterpret_cast<char*>(values.data()), values.size() * sizeof(values[0])));
+        static_assert(std::endian::native == std::endian::little);
+        if (sidecar.big_endian) swap_bytes(values);
+        return success();
+      },
+      samples);
+  if (!filled) return std::move(filled).error();
+  return samples;
+}
+
+Result<VolumeSource> finish(Sidecar sidecar, const VolumeRequest& request) {
+  std::vector<VolumeArray> arrays(1);
+  VolumeArray& array = arrays[0];
+  array.name = sidecar.raw.array;
+  array.type = to_string(sidecar.type);
+  array.components = sidecar.raw.components;
+  array.association = sidecar.raw.cell_data ? Association::cell : Association::node;
+  array.values = sidecar.samples;
+  volume_assembly::measure(sidecar.raw.samples, array);
+  std::vector<std::string> notes;
+  ASPERITY_TRY(const std::size_t chosen, volume_assembly::choose_array(arrays, request, notes));
+  static_cast<void>(chosen);
+  ASPERITY_TRY(VolumeSource source, volume_assembly::assemble(std::move(sidecar.raw), request));
+  source.arrays = std::move(arrays);
+  return source;
+}
+
+}  // namespace
+
+Result<VolumeSource> read_sidecar_volume(std::string_view text, std::string_view samples, const std::string& name,
+                                         const VolumeRequest& request) {
+  try {
+    Result<VolumeSource> source = [&]() -> Result<VolumeSource> {
+      ASPERITY_TRY(Sidecar sidecar, read_description(text, name, request));
+      ASPERITY_CHECK(check_length(sidecar, samples.size(), sidecar.file));
+      ASPERITY_TRY(sidecar.raw.samples, load_samples(sidecar, [&](char* to, std::size_t bytes) {
+                     std::memcpy(to, samples.data(), bytes);
+                     return success();
+                   }));
+      return finish(std::move(sidecar), request);
+    }();
+    if (!source) return std::move(source).error().in_file(name);
+    return source;
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::too_large, "needs more memory than there is", name, {}, "a smaller volume"};
+  }
+}
+
+Result<VolumeSource> read_sidecar_volume(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
+  constexpr std::uintmax_t largest_sidecar = std::uintmax_t{16} << 20U;
+  std::error_code problem;
+  const std::uintmax_t length = fs::file_size(path, problem);
+  std::ifstream stream(path, std::ios::binary);
+  if (problem || !stream)
+    return Error{ErrorCode::file_missing, "cannot be read", path.string(), {}, "a volume's sidecar (JSON)"};
+  if (length > largest_sidecar)
+    return Error{
+        ErrorCode::too_large, fmt::format("has {} bytes", length), path.string(), {}, "a sidecar of at most 16 MiB"};
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  Result<Sidecar> described = read_description(text, path.string(), request);
+  if (!described) return std::move(described).error().in_file(path.string());
+  Sidecar sidecar = std::move(*described);
+
+  const fs::path raw = path.parent_path() / fs::path(sidecar.file);
+  const std::uintmax_t held = fs::file_size(raw, problem);
+  std::ifstream data(raw, std::ios::binary);
+  if (problem || !data || !fs::is_regular_file(raw, problem)) {
+    return Error{ErrorCode::file_missing, fmt::format("the file of samples, \"{}\", cannot be read", raw.string()),
+                 path.string(), "file", "a readable file, its path relative to the sidecar"};
+  }
+  ASPERITY_CHECK(check_length(sidecar, held, raw.string()));
+  if (progress) progress("reading volume", 0.0);
+  ASPERITY_TRY(sidecar.raw.samples, load_samples(sidecar, [&](char* to, std::size_t bytes) -> Status {
+                 data.read(to, static_cast<std::streamsize>(bytes));
+                 if (static_cast<std::size_t>(data.gcount()) == bytes) return success();
+                 return Error{ErrorCode::file_truncated, "cannot be read to its end", raw.string(),
+                              fmt::format("byte {}", data.gcount()), "a readable file"};
+               }));
+  Result<VolumeSource> source = finish(std::move(sidecar), request);
+  if (!source) return std::move(source).error().in_file(raw.string());
+  return source;
+}
+
+}  // namespace asperity

@@ -1,0 +1,491 @@
+// The proxy law on isosurfaces.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "asperity/render/step.h"
+#include "tests/field/volumes.h"
+
+namespace asperity::testing {
+namespace {
+
+constexpr double degrees = 57.29577951308232;
+
+Instance iso_instance(std::shared_ptr<const ScalarField> field, double threshold, Inside inside = Inside::low,
+                      Sides sides = Sides::both) {
+  Instance instance;
+  instance.name = "iso";
+  instance.surface = std::make_shared<const IsoSurface>(IsoSurface::build(std::move(field), threshold, inside).value());
+  instance.sides = sides;
+  return instance;
+}
+
+Scene scene_of(Instance instance, double radius = 0.0) {
+  return Scene::build({std::move(instance)}, radius).value();
+}
+
+ForceSample touch(const Scene& scene, ProxyState& state, const Vec3& position, double dt = 1e-3) {
+  ProbeSample probe;
+  probe.pose.position = position;
+  return step(scene, state, probe, Seconds(dt));
+}
+
+/// A path over the sphere at `depth` below radius 0.03, `arc` (m) along it.
+Vec3 over_sphere(double arc, double depth) {
+  const double angle = arc / 0.03;
+  const double turn = 0.37 * angle;
+  return (0.03 - depth) * Vec3(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn), std::cos(angle));
+}
+
+class IsoProxyEach : public ::testing::TestWithParam<CellReconstruction> {};
+INSTANTIATE_TEST_SUITE_P(Both, IsoProxyEach,
+                         ::testing::Values(CellReconstruction::trilinear, CellReconstruction::smooth));
+
+TEST_P(IsoProxyEach, ForceOfASphereOf128CubedPointsWithinHalfADegree) {
+  const Scene scene = scene_of(iso_instance(sphere_field(128, GetParam()), 0.03));
+  ProxyState state;
+  touch(scene, state, over_sphere(0.0, -0.002));
+  double sum = 0.0;
+  double worst = 0.0;
+  double jump = 0.0;
+  double off = 0.0;
+  Vec3 last = Vec3::Zero();
+  const int ticks = 40000;
+  for (int i = 0; i < ticks; ++i) {
+    const Vec3 p = over_sphere(5e-5 * i, 0.001);
+    const ForceSample out = touch(scene, state, p);
+    ASSERT_TRUE(out.flags.has(TickFlag::contact));
+    ASSERT_FALSE(out.flags.has(TickFlag::not_converged));
+    const double angle = std::acos(std::min(1.0, out.wrench.force.normalized().dot(p.normalized()))) * degrees;
+    sum += angle;
+    worst = std::max(worst, angle);
+    off += std::pow(out.proxy.norm() - 0.03, 2);
+    if (i > 0) jump = std::max(jump, (out.wrench.force - last).norm());
+    last = out.wrench.force;
+  }
+  const bool smooth = GetParam() == CellReconstruction::smooth;
+  RecordProperty("mean_degrees", std::to_string(sum / ticks));
+  EXPECT_LT(sum / ticks, smooth ? 0.005 : 0.5);
+  EXPECT_LT(worst, smooth ? 0.02 : 1.2);
+  EXPECT_LT(std::sqrt(off / ticks), smooth ? 0.1e-6 : 4.5e-6);
+  // Exact: 1 N turned by 50 um over 29 mm. Facets of a trilinear field turn it by their fold.
+  EXPECT_LT(jump, smooth ? 1.1 * 1.0 * 5e-5 / 0.029 : 0.045);
+}
+
+TEST(IsoProxy, T2_force_is_continuous_over_cell_faces) {
+  const auto f = [](const Vec3& p) { return std::sin(90.0 * p.x()) + std::cos(70.0 * p.y()) + 60.0 * p.z(); };
+  const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.05, 41, 0.4), f));
+  const Scene scene = scene_of(iso_instance(field, 0.0));
+  const auto largest_change = [&](double stride) {
+    ProxyState state;
+    const auto at = [&](double arc) { return Vec3(-0.03 + arc, 0.6 * arc - 0.01, -0.028 + 0.0 * arc); };
+    touch(scene, state, Vec3(at(0.0).x(), at(0.0).y(), 0.049));
+    double worst = 0.0;
+    Vec3 last = touch(scene, state, at(0.0)).wrench.force;
+    for (double arc = stride; arc < 0.004; arc += stride) {
+      const ForceSample out = touch(scene, state, at(arc));
+      worst = std::max(worst, (out.wrench.force - last).norm());
+      last = out.wrench.force;
+    }
+    EXPECT_GT(last.norm(), 0.1);
+    return worst;
+  };
+  const double coarse = largest_change(1e-5);
+  const double fine = largest_change(1e-6);
+  EXPECT_NEAR(coarse / fine, 10.0, 2.0) << coarse << " " << fine;
+}
+
+TEST_P(IsoProxyEach, T1_frictionless_loops_give_no_energy) {
+  const auto f = [](const Vec3& p) { return p.z() + 0.001 * std::sin(p.x() / 0.003) * std::cos(p.y() / 0.004); };
+  const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.03, 61, 0.3), f), GetParam());
+  const Scene scene = scene_of(iso_instance(field, 0.0));
+  for (int loop = 0; loop < 4; ++loop) {
+    ProxyState state;
+    const auto at = [&](double t) {
+      const double a = 2.0 * 3.14159265358979 * t;
+      return Vec3(0.008 * std::cos(a), 0.006 * std::sin(a + loop), -0.0008 + 0.0006 * std::sin(2.0 * a + loop));
+    };
+    const int ticks = 20000;
+    touch(scene, state, Vec3(at(0.0).x(), at(0.0).y(), 0.01));
+    Vec3 place = at(0.0);
+    Vec3 force = touch(scene, state, place).wrench.force;
+    double work = 0.0;
+    double way = 0.0;
+    for (int i = 1; i <= ticks; ++i) {
+      const Vec3 next = at(static_cast<double>(i) / ticks);
+      const Vec3 now = touch(scene, state, next).wrench.force;
+      work += 0.5 * (force + now).dot(next - place);
+      way += (next - place).norm();
+      place = next;
+      force = now;
+    }
+    // Never given; where nothing folds, nothing is taken either.
+    EXPECT_LT(work, 1e-9 + 2e-6 * way) << loop;
+    if (GetParam() == CellReconstruction::smooth) {
+      EXPECT_GT(work, -1e-6 - 1e-4 * way) << loop;
+    }
+  }
+}
+
+TEST_P(IsoProxyEach, T1_spring_never_gains_at_a_held_probe) {
+  std::mt19937_64 generator(3);
+  for (const double friction : {0.0, 0.4}) {
+    for (std::uint64_t seed = 0; seed < 3; ++seed) {
+      Instance instance = iso_instance(random_field(14, GetParam(), seed), 0.0);
+      instance.material.static_friction = friction;
+      instance.material.dynamic_friction = 0.7 * friction;
+      const Scene scene = scene_of(std::move(instance));
+      ProxyState state;
+      Vec3 p = random_point(generator, 0.04);
+      int contacts = 0;
+      for (int i = 0; i < 4000; ++i) {
+        p += random_point(generator, i % 50 == 0 ? 0.02 : 0.0006);
+        p = p.cwiseMax(-0.049).cwiseMin(0.049);
+        const Vec3 before = state.proxy;
+        const ForceSample out = touch(scene, state, p);
+        contacts += out.flags.has(TickFlag::contact) ? 1 : 0;
+        ASSERT_FALSE(out.flags.has(TickFlag::energy_limited)) << i;
+        if (i > 0) {
+          ASSERT_LE((state.proxy - p).norm(), (before - p).norm() * (1.0 + 1e-9) + 1e-15) << i;
+        }
+      }
+      EXPECT_GT(contacts, 1500);
+    }
+  }
+}
+
+/// Touched from both sides, an isosurface of a rough field parts space in two: a proxy never comes to the other part.
+TEST_P(IsoProxyEach, T5_a_proxy_never_changes_sides_of_a_rough_field) {
+  std::mt19937_64 generator(23);
+  std::uint64_t ticks = 0;
+  std::uint64_t pressed = 0;
+  std::uint64_t unconverged = 0;
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const auto field = random_field(16, GetParam(), seed, 0.6);
+    Instance instance = iso_instance(field, 0.05);
+    instance.material.static_friction = 0.1 * static_cast<double>(seed);
+    instance.material.dynamic_friction = 0.08 * static_cast<double>(seed);
+    const Scene scene = scene_of(std::move(instance));
+    CellPolynomial cell;
+    const auto outside = [&](const Vec3& p) {
+      FieldJet jet;
+      return field->sample(0, p, cell, jet) && jet.value >= 0.05;
+    };
+    for (int run = 0; run < 20; ++run) {
+      ProxyState state;
+      Vec3 p = random_point(generator, 0.045);
+      const bool start = outside(p);
+      touch(scene, state, p);
+      const double speed = std::pow(10.0, -2.0 + 3.3 * run / 19.0);  // 0.01 to 20 m/s
+      for (int i = 0; i < 1000; ++i, ++ticks) {
+        p += random_point(generator, 1.0).normalized() * speed * 1e-3;
+        p = p.cwiseMax(-0.049).cwiseMin(0.049);
+        const ForceSample out = touch(scene, state, p);
+        unconverged += out.flags.has(TickFlag::not_converged) ? 1U : 0U;
+        if (!out.flags.has(TickFlag::contact)) {
+          ASSERT_EQ(outside(state.proxy), start) << seed << " " << run << " " << i << " speed " << speed;
+          continue;
+        }
+        ++pressed;
+        ASSERT_EQ(state.contacts[0].side > 0.0, start) << seed << " " << run << " " << i << " speed " << speed;
+      }
+    }
+  }
+  EXPECT_GT(pressed, ticks / 4);
+  EXPECT_LT(unconverged, ticks / 2000);
+}
+
+/// Shells one within the other: the proxy stays between those it started between.
+TEST_P(IsoProxyEach, T5_no_speed_passes_nested_shells) {
+  const auto field = std::make_shared<const ScalarField>(
+      sampled(cube_axes(0.05, 161), [](const Vec3& p) { return std::sin(p.norm() / 0.0008); }), GetParam());
+  const Scene scene = scene_of(iso_instance(field, 0.0));
+  std::mt19937_64 generator(17);
+  const double spacing = 0.0008 * 3.14159265358979;
+  int pressed = 0;
+  for (int run = 0; run < 20; ++run) {
+    ProxyState state;
+    Vec3 p = random_point(generator, 1.0).normalized() * spacing * (5.5 + run % 10);
+    touch(scene, state, p);
+    const double speed = std::pow(10.0, -2.0 + 3.3 * run / 19.0);  // 0.01 to 20 m/s
+    for (int i = 0; i < 600; ++i) {
+      p += random_point(generator, 1.0).normalized() * speed * 1e-3;
+      p = p.cwiseMax(-0.048).cwiseMin(0.048);
+      const ForceSample out = touch(scene, state, p);
+      pressed += out.flags.has(TickFlag::contact) ? 1 : 0;
+      const double shell = state.proxy.norm() / spacing - (5.5 + run % 10);
+      ASSERT_LT(std::abs(shell), 0.56) << run << " " << i << " speed " << speed;
+    }
+  }
+  EXPECT_GT(pressed, 3000);
+}
+
+TEST_P(IsoProxyEach, T5_wall_thinner_than_a_cell_holds_on_both_sides) {
+  const GridAxis axis = *GridAxis::uniform(-0.01, 0.001, 21);
+  std::vector<float> samples(21 * 21 * 21, 1.0F);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (i / (21 * 21) == 10) samples[i] = -0.02F;
+  }
+  const auto field = std::make_shared<const ScalarField>(
+      ScalarGrid::build({axis, axis, axis}, SampleArray(samples)).value(), GetParam());
+  const Scene scene = scene_of(iso_instance(field, 0.0));
+  for (const double side : {1.0, -1.0}) {
+    ProxyState state;
+    touch(scene, state, Vec3(0.0, 0.0, 0.004 * side));
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3 p(0.006 * std::sin(0.01 * i), 0.005 * std::cos(0.013 * i), -0.003 * side * std::sin(0.004 * i));
+      const ForceSample out = touch(scene, state, p);
+      ASSERT_GT(side * state.proxy.z(), 0.0) << i;
+      if (out.flags.has(TickFlag::contact)) {
+        ASSERT_GT(side * out.wrench.force.z(), 0.0);
+      }
+      if (side * p.z() < -1e-4) {
+        ASSERT_TRUE(out.flags.has(TickFlag::contact)) << i;
+      }
+    }
+  }
+}
+
+TEST(IsoProxy, BothSidesOrTheFrontAlone) {
+  const auto field = sphere_field(65);
+  const Scene both = scene_of(iso_instance(field, 0.03));
+  ProxyState inside;
+  touch(both, inside, Vec3(0.0, 0.0, 0.02));
+  const ForceSample pushed = touch(both, inside, Vec3(0.0, 0.0, 0.031));
+  EXPECT_NEAR(pushed.wrench.force.z(), -1.0, 1e-3);
+  EXPECT_NEAR(pushed.contact.normal.z(), -1.0, 1e-6);
+  const Scene front = scene_of(iso_instance(field, 0.03, Inside::low, Sides::front));
+  ProxyState leaving;
+  touch(front, leaving, Vec3(0.0, 0.0, 0.02));
+  EXPECT_TRUE(touch(front, leaving, Vec3(0.0, 0.0, 0.031)).wrench.force.isZero());
+  EXPECT_NEAR(touch(front, leaving, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 1.0, 1e-3);
+  const Scene hollow = scene_of(iso_instance(field, 0.03, Inside::high, Sides::front));
+  ProxyState within;
+  touch(hollow, within, Vec3(0.0, 0.0, 0.02));
+  EXPECT_NEAR(touch(hollow, within, Vec3(0.0, 0.0, 0.031)).wrench.force.z(), -1.0, 1e-3);
+}
+
+TEST(IsoProxy, FrictionHoldsWithinTheConeAndSlidesOnIt) {
+  const auto field =
+      std::make_shared<const ScalarField>(sampled(cube_axes(0.05, 41), [](const Vec3& p) { return p.z(); }));
+  Instance instance = iso_instance(field, 0.0);
+  instance.material.static_friction = 0.5;
+  instance.material.dynamic_friction = 0.3;
+  const Scene scene = scene_of(std::move(instance));
+  ProxyState state;
+  touch(scene, state, Vec3(0.0, 0.0, 0.001));
+  touch(scene, state, Vec3(0.0, 0.0, -0.001));
+  const ForceSample stuck = touch(scene, state, Vec3(0.00049, 0.0, -0.001));
+  EXPECT_NEAR(stuck.wrench.force.x(), -0.49, 1e-6);
+  const ForceSample slid = touch(scene, state, Vec3(0.00055, 0.0, -0.001));
+  EXPECT_NEAR(slid.wrench.force.x(), -0.3, 1e-6);
+  EXPECT_NEAR(slid.wrench.force.z(), 1.0, 1e-6);
+}
+
+TEST(IsoProxy, APoseMovesTheForceAlong) {
+  const auto field = sphere_field(65);
+  Instance placed = iso_instance(field, 0.03);
+  placed.world_from_object.position = Vec3(0.2, -0.1, 0.3);
+  placed.world_from_object.orientation = Quat(Eigen::AngleAxisd(0.8, Vec3(1.0, 2.0, -0.5).normalized()));
+  const Pose pose = placed.world_from_object;
+  const Scene here = scene_of(iso_instance(field, 0.03));
+  const Scene there = scene_of(std::move(placed));
+  ProxyState a;
+  ProxyState b;
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 p = over_sphere(1e-4 * i, 0.001 - 0.004 * (i == 0 ? 1.0 : 0.0));
+    const ForceSample plain = touch(here, a, p);
+    const ForceSample moved = touch(there, b, pose.apply(p));
+    ASSERT_LT((pose.rotate(plain.wrench.force) - moved.wrench.force).norm(), 1e-6);
+  }
+}
+
+TEST(IsoProxy, AThresholdChangedUnderTheProbeMovesTheSurfaceAtItsSpeed) {
+  const auto field = sphere_field(65);
+  const IsoSurface first = IsoSurface::build(field, 0.03, Inside::low, 0.02).value();
+  for (const double target : {0.034, 0.026, 0.0305}) {
+    Instance instance = iso_instance(field, 0.03);
+    instance.surface = std::make_shared<const IsoSurface>(first);
+    const Scene before = scene_of(instance);
+    instance.surface = std::make_shared<const IsoSurface>(first.with_threshold(target).value());
+    const Scene after = scene_of(instance);
+    for (const double dt : {1e-3, 2.5e-4}) {
+      ProxyState state;
+      touch(before, state, Vec3(0.0, 0.0, 0.032), dt);
+      const Vec3 p(0.0003, 0.0, 0.0292);
+      Vec3 last = touch(before, state, p, dt).wrench.force;
+      EXPECT_NEAR(last.norm(), 0.8, 0.01);
+      double jump = 0.0;
+      double most = 0.0;
+      ForceSample out;
+      for (double t = 0.0; t < 0.5; t += dt) {
+        out = touch(after, state, p, dt);
+        jump = std::max(jump, (out.wrench.force - last).norm());
+        most = std::max(most, out.wrench.force.norm());
+        last = out.wrench.force;
+      }
+      // 20 mm/s on 1 N/mm.
+      EXPECT_LT(jump, 1.05 * 1000.0 * 0.02 * dt) << target;
+      if (target < 0.0292) {
+        EXPECT_FALSE(out.flags.has(TickFlag::contact));
+      } else {
+        EXPECT_NEAR(state.proxy.norm(), target, 1e-6) << target;
+        // Outwards, the spring would gain: what nobody paid for is not rendered.
+        EXPECT_LE(out.wrench.force.norm(), 1000.0 * (target - p.norm()) * 1.001);
+        EXPECT_GT(out.wrench.force.norm(), 0.1);
+      }
+      EXPECT_LT(most, 1000.0 * (std::max(target, 0.03) - p.norm()) * 1.001);
+    }
+  }
+}
+
+TEST(IsoProxy, ASurfaceThatComesOverAFreeProbeTakesItUp) {
+  const auto field = sphere_field(65);
+  const IsoSurface first = IsoSurface::build(field, 0.02, Inside::low).value();
+  Instance instance = iso_instance(field, 0.02, Inside::low, Sides::front);
+  instance.surface = std::make_shared<const IsoSurface>(first);
+  const Scene before = scene_of(instance);
+  instance.surface = std::make_shared<const IsoSurface>(first.with_threshold(0.0215).value());
+  const Scene after = scene_of(instance);
+  ProxyState state;
+  const Vec3 p(0.0, 0.0, 0.021);
+  EXPECT_FALSE(touch(before, state, p).flags.has(TickFlag::contact));
+  Vec3 last = Vec3::Zero();
+  ForceSample out;
+  for (int i = 0; i < 200; ++i) {
+    out = touch(after, state, p);
+    ASSERT_LT((out.wrench.force - last).norm(), 0.0211);
+    last = out.wrench.force;
+  }
+  EXPECT_TRUE(out.flags.has(TickFlag::contact));
+  EXPECT_NEAR(state.proxy.norm(), 0.0215, 1e-6);
+}
+
+TEST(IsoProxy, ABallRestsItsRadiusAwayFromTheSurface) {
+  for (const double radius : {0.0005, 0.003}) {
+    const Scene scene = scene_of(iso_instance(sphere_field(65), 0.03), radius);
+    ProxyState state;
+    touch(scene, state, over_sphere(0.0, -0.0015 - radius));
+    for (int i = 0; i < 60; ++i) {
+      const Vec3 p = over_sphere(5e-5 * i, 0.0005 - radius);
+      const ForceSample out = touch(scene, state, p);
+      ASSERT_TRUE(out.flags.has(TickFlag::contact));
+      EXPECT_NEAR(state.proxy.norm(), 0.03 + radius, 2e-6) << radius << " " << i;
+      EXPECT_NEAR(out.wrench.force.norm(), 0.5, 0.01);
+      EXPECT_GT(out.wrench.force.normalized().dot(p.normalized()), std::cos(0.5 / degrees));
+    }
+  }
+}
+
+/// Amendment 13: phi / |grad phi| is no distance. In a groove narrower than the ball it rests on both walls.
+TEST(IsoProxy, ABallRestsOnBothWallsOfANarrowGroove) {
+  const auto f = [](const Vec3& p) { return p.z() + 0.004 * std::cos(p.x() / 0.001); };
+  const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.012, 97), f));
+  const double radius = 0.0015;
+  const Scene scene = scene_of(iso_instance(field, 0.0), radius);
+  ProxyState state;
+  touch(scene, state, Vec3(0.0001, 0.0, 0.009));
+  ForceSample out;
+  for (int i = 0; i < 40; ++i) out = touch(scene, state, Vec3(0.0001, 0.0, 0.008 - 0.0003 * i));
+  // Rests where the distance to the walls is its radius: found by fine sampling of the exact curve.
+  double rest = -0.004;
+  for (double z = 0.006; z > -0.004; z -= 1e-5) {
+    double nearest = infinity;
+    for (double x = -0.004; x < 0.004; x += 1e-5) {
+      nearest = std::min(nearest, std::hypot(x, z + 0.004 * std::cos(x / 0.001)));
+    }
+    if (nearest < radius) {
+      rest = z;
+      break;
+    }
+  }
+  EXPECT_NEAR(state.proxy.z(), rest, 1e-4);
+  EXPECT_NEAR(state.proxy.x(), 0.0, 1e-4);
+  EXPECT_GT(out.wrench.force.z(), 0.0);
+}
+
+TEST(IsoProxy, NothingIsFeltBeyondTheBorderOrInHoles) {
+  const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.02, 21), [](const Vec3& p) {
+    return p.norm() < 0.005 ? std::numeric_limits<double>::quiet_NaN() : p.z();
+  }));
+  const Scene scene = scene_of(iso_instance(field, 0.0));
+  ProxyState state;
+  touch(scene, state, Vec3(-0.012, 0.001, 0.002));
+  EXPECT_TRUE(touch(scene, state, Vec3(-0.012, 0.001, -0.001)).flags.has(TickFlag::contact));
+  // Along the surface into the hole: let go.
+  bool held = true;
+  for (int i = 0; i < 100 && held; ++i) {
+    const Vec3 p(-0.012 + 1.1e-4 * i, 0.001, -0.001);
+    held = touch(scene, state, p).flags.has(TickFlag::contact);
+    if (held) {
+      EXPECT_LT(p.x(), -0.002);
+    }
+  }
+  EXPECT_FALSE(held);
+  ProxyState other;
+  touch(scene, other, Vec3(0.01, 0.01, 0.002));
+  for (int i = 0; i < 150; ++i) {
+    const Vec3 p(0.01 + 1e-4 * i, 0.01, -0.001);
+    const bool contact = touch(scene, other, p).flags.has(TickFlag::contact);
+    EXPECT_EQ(contact, p.x() <= 0.02 + 1e-9) << i;
+  }
+}
+
+TEST(IsoProxy, TwoSurfacesHoldTogether) {
+  const auto floor =
+      std::make_shared<const ScalarField>(sampled(cube_axes(0.02, 31), [](const Vec3& p) { return p.z(); }));
+  const auto wall = std::make_shared<const ScalarField>(
+      sampled(cube_axes(0.02, 31), [](const Vec3& p) { return p.x() + 0.2 * p.z(); }));
+  const Scene scene = Scene::build({iso_instance(floor, 0.0), iso_instance(wall, 0.0)}, 0.0).value();
+  ProxyState state;
+  touch(scene, state, Vec3(0.003, 0.0, 0.003));
+  ForceSample out;
+  for (int i = 0; i < 30; ++i) out = touch(scene, state, Vec3(0.003 - 1.5e-4 * i, 1e-4 * i, 0.003 - 1.5e-4 * i));
+  EXPECT_EQ(out.contact.count, 2U);
+  EXPECT_NEAR(state.proxy.x(), 0.0, 2e-5);
+  EXPECT_NEAR(state.proxy.z(), 0.0, 2e-5);
+  EXPECT_NEAR(state.proxy.y(), 2.9e-3, 2e-5);
+}
+
+TEST(IsoProxy, RunsTwiceBitForBit) {
+  std::vector<Vec3> first;
+  for (int run = 0; run < 2; ++run) {
+    Instance instance = iso_instance(random_field(20, CellReconstruction::smooth, 5), 0.0);
+    instance.material.static_friction = 0.3;
+    instance.material.dynamic_friction = 0.2;
+    const Scene scene = scene_of(std::move(instance));
+    std::mt19937_64 generator(5);
+    ProxyState state;
+    Vec3 p = Vec3::Zero();
+    for (std::size_t i = 0; i < 2000; ++i) {
+      p = (p + random_point(generator, 0.001)).cwiseMax(-0.04).cwiseMin(0.04);
+      const Vec3 force = touch(scene, state, p).wrench.force;
+      if (run == 0) {
+        first.push_back(force);
+      } else {
+        ASSERT_EQ(force, first[i]);
+      }
+    }
+  }
+}
+
+TEST(IsoProxy, LawsThatNeedTrianglesAreRefused) {
+  for (const char* name : {"god-object", "force-shading", "height-field", "mesostructure", "dense-mesh"}) {
+    Instance instance = iso_instance(sphere_field(17), 0.03);
+    instance.law = law_by_name(name).value();
+    const Error error = Scene::build({instance}, 0.0).error();
+    EXPECT_EQ(error.code, ErrorCode::unsupported_pair);
+    EXPECT_EQ(error.place, "surfaces[0].law");
+    EXPECT_EQ(error.accepted, "proxy, avila or cross-uncross");
+  }
+  Instance instance = iso_instance(sphere_field(17), 0.03);
+  instance.law = law_by_name("avila").value();
+  EXPECT_TRUE(Scene::build({instance}, 0.0));
+  EXPECT_FALSE(Scene::build({instance}, 0.001));
+  EXPECT_FALSE(Scene::build({}, 0.0));
+}
+
+}  // namespace
+}  // namespace asperity::testing

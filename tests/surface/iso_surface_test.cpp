@@ -1,0 +1,250 @@
+#include "asperity/surface/iso_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "asperity/surface/iso_descent.h"
+#include "tests/field/volumes.h"
+
+namespace asperity::testing {
+namespace {
+
+class IsoEach : public ::testing::TestWithParam<CellReconstruction> {};
+INSTANTIATE_TEST_SUITE_P(Both, IsoEach, ::testing::Values(CellReconstruction::trilinear, CellReconstruction::smooth));
+
+double value_at(const ScalarField& field, const Vec3& p) {
+  CellPolynomial cell;
+  FieldJet jet;
+  return field.sample(0, p, cell, jet) ? jet.value : std::nan("");
+}
+
+/// First change of sign along a motion, by steps of a 200th of a cell.
+bool marched(const ScalarField& field, const Segment& motion, double threshold, double& t) {
+  const double length = (motion.to - motion.from).norm();
+  const int steps = static_cast<int>(length / field.narrowest_cell() * 200.0) + 1;
+  const double start = value_at(field, motion.from);
+  for (int i = 1; i <= steps; ++i) {
+    t = static_cast<double>(i) / steps;
+    if ((value_at(field, motion.from + t * (motion.to - motion.from)) >= threshold) != (start >= threshold))
+      return true;
+  }
+  return false;
+}
+
+TEST_P(IsoEach, T5_first_crossing_is_that_of_fine_steps_on_rough_fields) {
+  std::mt19937_64 generator(1);
+  int crossings = 0;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    const auto field = random_field(12, GetParam(), seed, 0.6);
+    const IsoSurface surface = IsoSurface::build(field, 0.1, Inside::low).value();
+    IsoHint hint;
+    for (int n = 0; n < 60; ++n) {
+      const Vec3 from = random_point(generator, 0.049);
+      const Vec3 to = n % 3 == 0 ? random_point(generator, 0.049) : Vec3(from + random_point(generator, 0.004));
+      if (!field->contains(to)) continue;
+      const IsoCrossing found = surface.view().first_crossing({from, to}, hint);
+      double t = 0.0;
+      if (marched(*field, {from, to}, 0.1, t)) {
+        ASSERT_TRUE(found.found) << seed << " " << n;
+        EXPECT_LE(found.t, t + 1e-9);
+        ++crossings;
+      }
+      if (found.found) {
+        // On the surface, and on the sides that it says.
+        EXPECT_NEAR(value_at(*field, found.point), 0.1, 1e-6);
+        const double before = value_at(*field, from);
+        EXPECT_EQ(found.inward, before >= 0.1);
+        EXPECT_GE((from - to).dot(found.outward) * (found.inward ? 1.0 : -1.0), -1e-9);
+      }
+    }
+  }
+  EXPECT_GT(crossings, 150);
+}
+
+TEST_P(IsoEach, M_3_no_speed_passes_a_sheet_thinner_than_a_cell) {
+  // A wall whose two sides lie within one cell: values dip below 0 at one layer of samples only.
+  const GridAxis axis = *GridAxis::uniform(-0.01, 0.001, 21);
+  std::vector<float> samples(21 * 21 * 21, 1.0F);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (i / (21 * 21) == 10) samples[i] = -0.02F;
+  }
+  const auto field = std::make_shared<const ScalarField>(
+      ScalarGrid::build({axis, axis, axis}, SampleArray(samples)).value(), GetParam());
+  const IsoSurface surface = IsoSurface::build(field, 0.0, Inside::low).value();
+  std::mt19937_64 generator(2);
+  std::uniform_real_distribution<double> side(-0.009, 0.009);
+  IsoHint hint;
+  for (int n = 0; n < 20000; ++n) {
+    const Vec3 from(side(generator), side(generator), 0.001 + 0.008 * std::abs(side(generator)) / 0.009);
+    const Vec3 to(side(generator), side(generator), -from.z());
+    const IsoCrossing in = surface.view().first_crossing({from, to}, hint);
+    ASSERT_TRUE(in.found && in.inward);
+    const IsoCrossing out = surface.view().first_crossing({from, to}, hint, in.t + 1e-9);
+    ASSERT_TRUE(out.found && !out.inward);
+    // Thinner than a quarter of a cell.
+    EXPECT_LT(std::abs((out.point - in.point).z()), 2.5e-4);
+  }
+}
+
+TEST(IsoSurface, FrontAloneIsPassedFromBehind) {
+  const IsoSurface surface = IsoSurface::build(sphere_field(33), 0.03, Inside::low).value();
+  IsoHint hint;
+  const Segment out{Vec3(0.001, 0.002, 0.0), Vec3(0.045, 0.002, 0.0)};
+  const Segment through{Vec3(-0.045, 0.001, 0.003), Vec3(0.045, 0.001, 0.003)};
+  EXPECT_FALSE(surface.view().first_touch(out, Sides::front, hint).found);
+  EXPECT_TRUE(surface.view().first_touch(out, Sides::both, hint).found);
+  EXPECT_TRUE(surface.view().first_touch(through, Sides::front, hint).inward);
+  const Segment back{Vec3(0.0, 0.001, 0.003), Vec3(0.049, 0.001, 0.003)};
+  EXPECT_FALSE(surface.view().first_touch(back, Sides::front, hint).found);
+  // The other inside turns front and back.
+  const IsoSurface hollow = IsoSurface::build(sphere_field(33), 0.03, Inside::high).value();
+  EXPECT_TRUE(hollow.view().first_touch(out, Sides::front, hint).found);
+  EXPECT_LT(hollow.view().first_touch(out, Sides::front, hint).outward.x(), -0.9);
+}
+
+TEST(IsoSurface, NestedShellsAreMetOneAfterTheOther) {
+  const auto field = std::make_shared<const ScalarField>(
+      sampled(cube_axes(0.05, 101), [](const Vec3& p) { return std::sin(p.norm() / 0.003); }));
+  const IsoSurface surface = IsoSurface::build(field, 0.0, Inside::low).value();
+  IsoHint hint;
+  const Segment motion{Vec3(0.0005, 0.0, 0.0001), Vec3(0.049, 0.001, 0.0)};
+  double from = 0.0;
+  int met = 0;
+  for (;; ++met) {
+    const IsoCrossing crossing = surface.view().first_crossing(motion, hint, from);
+    if (!crossing.found) break;
+    // Shells at multiples of pi times 3 mm, turn by turn.
+    EXPECT_NEAR(crossing.point.norm() / 0.003 / 3.14159265358979, met + 1, 0.02);
+    EXPECT_EQ(crossing.inward, met % 2 == 0);
+    from = crossing.t + 1e-9;
+  }
+  EXPECT_EQ(met, 5);
+}
+
+TEST_P(IsoEach, NearestPointIsThatOfADenseSampling) {
+  std::mt19937_64 generator(4);
+  // Smooth, but with several sheets and both curvatures.
+  const auto f = [](const Vec3& p) {
+    return std::sin(p.x() / 0.012) * std::cos(p.y() / 0.012) + std::sin(p.y() / 0.012) * std::cos(p.z() / 0.012) +
+           std::sin(p.z() / 0.012) * std::cos(p.x() / 0.012);
+  };
+  const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.03, 41, 0.3), f), GetParam());
+  const IsoSurface surface = IsoSurface::build(field, 0.2, Inside::high).value();
+  std::vector<Vec3> points;
+  IsoHint hint;
+  for (int i = 0; i <= 120; ++i) {
+    for (int j = 0; j <= 120; ++j) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Segment line;
+        line.from[axis] = -0.03;
+        line.to[axis] = 0.03;
+        line.from[(axis + 1) % 3] = line.to[(axis + 1) % 3] = -0.03 + 0.0005 * i;
+        line.from[(axis + 2) % 3] = line.to[(axis + 2) % 3] = -0.03 + 0.0005 * j;
+        double from = 0.0;
+        for (;;) {
+          const IsoCrossing crossing = surface.view().first_crossing(line, hint, from);
+          if (!crossing.found) break;
+          points.push_back(crossing.point);
+          from = crossing.t + 1e-7;
+        }
+      }
+    }
+  }
+  ASSERT_GT(points.size(), 10000U);
+  for (int n = 0; n < 300; ++n) {
+    const Vec3 p = random_point(generator, 0.028);
+    double nearest = infinity;
+    for (const Vec3& point : points) nearest = std::min(nearest, (point - p).norm());
+    IsoHint fresh;
+    const Foot foot = surface.view().closest(p, 0.02, fresh);
+    ASSERT_TRUE(foot.found());
+    EXPECT_NEAR(value_at(*field, foot.point), 0.2, 1e-6);
+    EXPECT_NEAR(foot.distance, (foot.point - p).norm(), 1e-12);
+    // Never farther than a sample of the surface, and not nearer than the sampling allows.
+    EXPECT_LE(foot.distance, nearest + 2e-7) << n;
+    EXPECT_GE(foot.distance, nearest - 4e-4);
+    // A bound below the distance finds nothing.
+    IsoHint none;
+    EXPECT_FALSE(surface.view().closest(p, 0.99 * foot.distance, none).found());
+  }
+}
+
+TEST_P(IsoEach, DescentComesToTheNearestPointAndNeverFarther) {
+  const auto field = sphere_field(65, GetParam());
+  const IsoSurface surface = IsoSurface::build(field, 0.03, Inside::low).value();
+  std::mt19937_64 generator(9);
+  for (int n = 0; n < 500; ++n) {
+    IsoHint hint;
+    const Vec3 goal = random_point(generator, 1.0).normalized() * 0.027;
+    const Vec3 around = (goal + random_point(generator, 0.012)).normalized() * 0.045;
+    const IsoCrossing start = surface.view().first_crossing({around, Vec3::Zero()}, hint);
+    ASSERT_TRUE(start.found);
+    IsoDescent descent;
+    descent.point = start.point;
+    descent.goal = goal;
+    descent.budget = 400;
+    double distance = (start.point - goal).norm();
+    const IsoEnd end = descend(surface.view(), descent, hint);
+    EXPECT_EQ(end, IsoEnd::rest);
+    EXPECT_LE((descent.point - goal).norm(), distance);
+    EXPECT_NEAR(value_at(*field, descent.point), 0.03, 1e-9);
+    const double bound = GetParam() == CellReconstruction::smooth ? 1e-4 : 4e-2;
+    EXPECT_LT((descent.point - 0.03 * goal.normalized()).norm(), bound * 0.03);
+  }
+}
+
+TEST(IsoSurface, EndsAtTheVolumesBorder) {
+  const IsoSurface surface =
+      IsoSurface::build(std::make_shared<const ScalarField>(
+                            sampled(cube_axes(0.02, 21), [](const Vec3& p) { return p.z() + 0.1 * p.x(); })),
+                        0.0, Inside::low)
+          .value();
+  IsoHint hint;
+  const Segment beside{Vec3(0.03, 0.0, 0.03), Vec3(0.03, 0.0, -0.03)};
+  EXPECT_FALSE(surface.view().first_crossing(beside, hint).found);
+  // In from outside the volume, under the surface: nothing is passed; out through it is.
+  const Segment up{Vec3(0.0, 0.0, -0.05), Vec3(0.0, 0.0, 0.05)};
+  const IsoCrossing crossing = surface.view().first_crossing(up, hint);
+  EXPECT_TRUE(crossing.found && !crossing.inward);
+  IsoDescent descent;
+  descent.point = crossing.point;
+  descent.goal = Vec3(0.05, 0.0, -0.01);
+  EXPECT_EQ(descend(surface.view(), descent, hint), IsoEnd::rim);
+  EXPECT_NEAR(descent.point.x(), 0.02, 1e-9);
+}
+
+TEST(IsoSurface, RefusesAThresholdThatTheFieldNeverPasses) {
+  const auto field = sphere_field(17);
+  const Error beyond = IsoSurface::build(field, 1.0, Inside::low).error();
+  EXPECT_EQ(beyond.code, ErrorCode::bad_value);
+  EXPECT_EQ(beyond.place, "threshold");
+  EXPECT_NE(beyond.what.find("ranges from 0"), std::string::npos);
+  EXPECT_FALSE(IsoSurface::build(field, std::nan(""), Inside::low));
+  EXPECT_FALSE(IsoSurface::build(field, 0.03, Inside::low, 0.0));
+  EXPECT_FALSE(IsoSurface::build(nullptr, 0.03, Inside::low));
+  const IsoSurface surface = IsoSurface::build(field, 0.03, Inside::low).value();
+  EXPECT_NEAR(surface.typical_slope(), 1.0, 0.05);
+  EXPECT_NEAR(surface.surface_bounds().upper.x(), 0.03, 0.007);
+  EXPECT_EQ(surface.with_threshold(0.02)->threshold(), 0.02);
+}
+
+TEST(IsoSurface, BallStopsAtItsRadius) {
+  const IsoSurface surface = IsoSurface::build(sphere_field(65), 0.03, Inside::low).value();
+  std::mt19937_64 generator(12);
+  for (int n = 0; n < 50; ++n) {
+    Hint hint;
+    const Vec3 from = random_point(generator, 1.0).normalized() * 0.045;
+    const Vec3 to = -from + random_point(generator, 0.02);
+    const SweptHit hit = surface.segment({from, to}, 0.002, Sides::both, hint);
+    const Vec3 d = (to - from).normalized();
+    const double nearest = (from - from.dot(d) * d).norm();
+    if (nearest > 0.0325) continue;
+    if (nearest > 0.0315) continue;  // grazing
+    ASSERT_TRUE(hit.hit);
+    EXPECT_NEAR((from + hit.t * (to - from)).norm(), 0.032, 2e-6);
+  }
+}
+
+}  // namespace
+}  // namespace asperity::testing
