@@ -105,6 +105,26 @@ void print_detection(const std::vector<DetectionRow>& rows) {
   }
 }
 
+void print_loop_rates(const std::vector<LoopRateRow>& rows, const std::vector<Column>& columns) {
+  if (rows.empty()) return;
+  std::cout << fmt::format("{:>12}{:>12}", "samples", "memory");
+  for (const Column& column : columns) std::cout << fmt::format("{:>24}", column.entry.law);
+  std::cout << '\n';
+  for (const LoopRateRow& row : rows) {
+    std::cout << fmt::format("{:>12}{:>12}", row.samples, fmt::format("{:.3g} MB", row.bytes * 1e-6));
+    for (const double p50 : row.p50)
+      std::cout << fmt::format("{:>24}", fmt::format("{}, {:.0f} kHz", format_seconds(p50), 1e-3 / p50));
+    std::cout << '\n';
+  }
+}
+
+Json loop_rate_json(const std::vector<LoopRateRow>& rows) {
+  Json list = Json::array();
+  for (const LoopRateRow& row : rows)
+    list.push_back({{"samples", row.samples}, {"bytes", row.bytes}, {"update_p50_s", row.p50}});
+  return list;
+}
+
 Json detection_json(const std::vector<DetectionRow>& rows) {
   Json list = Json::array();
   for (const DetectionRow& row : rows) {
@@ -137,18 +157,25 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     ASPERITY_TRY(Column column, run_law(experiment, name, progress));
     columns.push_back(std::move(column));
   }
+  if (progress) progress("measuring the loop rate", 0.0);
+  std::vector<Law> felt;
+  for (const std::string& name : laws) felt.push_back(law_by_name(name).value());
+  ASPERITY_TRY(const std::vector<LoopRateRow> rates,
+               loop_rates(experiment.scene, experiment.path, felt, experiment.rate));
   ASPERITY_TRY(const std::vector<DetectionRow> detection, detect_layers(experiment));
   Json document{{"program", program_name()},
                 {"command", console.command_line},
                 {"scene", experiment.name},
                 {"notes", experiment.notes}};
   for (const Column& column : columns) document["laws"].push_back(law_json_of(column));
+  if (!rates.empty()) document["loop_rate"] = loop_rate_json(rates);
   if (!detection.empty()) document["detection"] = detection_json(detection);
   if (!options.no_report) {
     CompareReport report;
     report.origin = report_origin(experiment, console);
     report.setup = setup_facts(experiment);
     for (const Column& column : columns) report.entries.push_back(column.entry);
+    report.loop_rates = rates;
     report.detection = detection;
     ASPERITY_TRY(report.picture,
                  render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
@@ -163,6 +190,7 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     console.print(document);
   } else {
     print_table(experiment, columns);
+    print_loop_rates(rates, columns);
     print_detection(detection);
     std::cout << (options.no_report ? "numbers " + (folder / "compare.json").string()
                                     : "report  " + (folder / "report.html").string())

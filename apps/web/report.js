@@ -306,6 +306,27 @@ window.addEventListener("error", (event) => {
     }
   }
 
+  function draw_loop_rate() {
+    if (!data.loop_rate || data.loop_rate.length === 0) return;
+    section("Loop rate over the size of the data", "The same isosurface on every eighth, fourth, second and every sample along each axis: median time of a tick on the machine named below.");
+    const names = data.laws.map((law) => law.law);
+    const table = make(make(page, "div", "scroll"), "table");
+    const head = make(make(table, "thead"), "tr");
+    for (const name of ["samples", "memory (MB)", ...names.map((name) => `${name} (\u00b5s)`), ...names.map((name) => `${name} (kHz)`)]) make(head, "th", "", name);
+    const body = make(table, "tbody");
+    for (const [samples, megabytes, ...times] of data.loop_rate) {
+      const row = make(body, "tr");
+      make(row, "td", "", String(samples));
+      make(row, "td", "", number(megabytes));
+      for (const time of times) make(row, "td", "", number(time));
+      for (const time of times) make(row, "td", "", number(1e3 / time));
+    }
+    if (data.loop_rate.length > 1)
+      plot(page, { title: "Time of a tick", x: "log2 of the samples", y: "\u00b5s", unit: "", zero: true, labels: ["size", ...names],
+        colours: names.map((_, k) => law_colours[k % law_colours.length]), series: {},
+        rows: data.loop_rate.map(([samples, , ...times]) => [Math.log2(samples), ...times]) });
+  }
+
   function draw_detection() {
     if (!data.detection || data.detection.length === 0) return;
     section("Detection of thin layers", "Share of straight passages through the isosurface of a linear field, each from a random start, in which a law answered with a contact. " +
@@ -341,6 +362,7 @@ window.addEventListener("error", (event) => {
     law_plot(page, "direction_distance", 1, { title: "Direction error", x: "distance (mm)", y: "deg", unit: "mm", group: "distance", zero: true });
     if (data.laws.every((law) => law.follow_time))
       law_plot(page, "follow_time", 1, { title: "Follow error over time", hint: follow_hint, x: "time (s)", y: "%", unit: "s", zero: true });
+    draw_loop_rate();
     draw_detection();
     section("Energy, spectra");
     law_plot(page, "energy_time", 3, { title: "Work + stored energy", hint: "A passive contact never lets it rise.", x: "time (s)", y: "mJ", unit: "s" });

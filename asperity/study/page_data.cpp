@@ -240,6 +240,17 @@ json detection_data(const std::vector<DetectionRow>& rows) {
   return data;
 }
 
+/// Rows [samples, MB, microseconds a tick of each law ...].
+json loop_rate_data(const std::vector<LoopRateRow>& rows) {
+  json data = json::array();
+  for (const LoopRateRow& row : rows) {
+    json entry{row.samples, significant(row.bytes * 1e-6)};
+    for (const double p50 : row.p50) entry.push_back(significant(p50 * 1e6));
+    data.push_back(std::move(entry));
+  }
+  return data;
+}
+
 }  // namespace
 
 Status check_series(const RunSeries& series, const std::string& place) {
@@ -283,6 +294,7 @@ json compare_data(const CompareReport& report) {
             "stiffness."
           : "the reconstructed relief; a law that does not render relief shows it here.");
   data["picture"] = picture_data(report.picture);
+  data["loop_rate"] = loop_rate_data(report.loop_rates);
   data["detection"] = detection_data(report.detection);
   data["laws"] = json::array();
   const std::size_t stretches = std::max(fewest_stretches, compare_stretches / report.entries.size());

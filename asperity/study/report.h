@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "asperity/core/result.h"
+#include "asperity/study/loop_rate.h"
 #include "asperity/study/metrics.h"
 #include "asperity/study/picture.h"
 
@@ -52,6 +53,7 @@ struct CompareReport {
   std::vector<ReportFact> setup;
   std::vector<CompareEntry> entries;
   std::optional<Picture> picture;
+  std::vector<LoopRateRow> loop_rates;  ///< one p50 for each of `entries`; empty where no isosurface is touched
   std::vector<DetectionRow> detection;  ///< who notices a thin layer; empty where no isosurface is touched
 };
 

@@ -17,6 +17,9 @@ constexpr double nearly_on_surface = 1e-5;
 // How near a face a point counts as on it, of the cell's width: nearer, a step to the face would be lost in rounding.
 constexpr double on_face = 1e-8;
 
+// A way that crosses a face by no more than this share of its length runs along the face: the rest is rounding.
+constexpr double along_face = 1e-9;
+
 /// The surface's own frame at a point, seen from one cell, and where the goal pulls the point in it.
 struct Pull {
   bool known = false;
@@ -151,10 +154,11 @@ class Leader {
 
   /// Whether a step from x leads into the cell, over the faces that x lies on other than `face`.
   bool leads_into(const CellIndex& cell, const Vec3& step, int face) const noexcept {
+    const double noise = along_face * step.norm();
     for (std::size_t a = 0; a < 3; ++a) {
       if (!on_face_[a] || static_cast<int>(a) == face) continue;
       const double d = step[static_cast<int>(a)];
-      if (cell.at[a] < node_[a] ? d > 0.0 : d < 0.0) return false;
+      if (cell.at[a] < node_[a] ? d > noise : d < -noise) return false;
     }
     return true;
   }
@@ -227,10 +231,12 @@ class Leader {
 
   /// On the volume's border, or that of what is known, with the goal beyond.
   bool at_rim() noexcept {
+    const double noise = along_face * (descent_.goal - x_).norm();
     for (std::size_t a = 0; a < 3; ++a) {
       if (!on_face_[a]) continue;
       const double d = descent_.goal[static_cast<int>(a)] - x_[static_cast<int>(a)];
-      if (d != 0.0 && node_[a] == (d > 0.0 ? axes_[a].cells() : 0U)) return true;
+      if (std::abs(d) <= noise) continue;
+      if (node_[a] == (d > 0.0 ? axes_[a].cells() : 0U)) return true;
       if (first_[a] == last_[a]) continue;
       CellIndex beyond{{first_[0], first_[1], first_[2]}};
       beyond.at[a] = d > 0.0 ? last_[a] : first_[a];

@@ -433,6 +433,27 @@ TEST(IsoProxy, NothingIsFeltBeyondTheBorderOrInHoles) {
   }
 }
 
+/// Along the border of a volume that is two samples thick, as a two-dimensional simulation is.
+TEST(IsoProxy, SlidesAlongTheBorderOfAFlatVolume) {
+  const GridAxis wide = *GridAxis::uniform(-0.05, 0.005, 21);
+  const GridAxis thin = *GridAxis::uniform(-0.005, 0.01, 2);
+  const auto field = std::make_shared<const ScalarField>(
+      sampled({wide, wide, thin}, [](const Vec3& p) { return std::hypot(p.x(), p.y()); }));
+  const Scene scene = scene_of(iso_instance(field, 0.03));
+  for (const double z : {0.005, 0.005 - 2e-10, 0.005 - 1e-18, 0.0}) {
+    ProxyState state;
+    touch(scene, state, Vec3(0.032, 0.0, z));
+    for (int i = 0; i < 2000; ++i) {
+      const double angle = 1e-3 * i;
+      const Vec3 p(0.0295 * std::cos(angle), 0.0295 * std::sin(angle), z + (i % 3 - 1) * 1e-18);
+      const ForceSample out = touch(scene, state, p);
+      ASSERT_TRUE(out.flags.has(TickFlag::contact)) << z << " " << i;
+      ASSERT_FALSE(out.flags.has(TickFlag::not_converged)) << z << " " << i;
+      ASSERT_NEAR(out.wrench.force.norm(), 0.5, 0.03);
+    }
+  }
+}
+
 TEST(IsoProxy, TwoSurfacesHoldTogether) {
   const auto floor =
       std::make_shared<const ScalarField>(sampled(cube_axes(0.02, 31), [](const Vec3& p) { return p.z(); }));
