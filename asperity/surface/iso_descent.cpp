@@ -58,18 +58,8 @@ class Leader {
   enum class Turn { moved, rest, left, rim };
 
   const CellPolynomial* load(const CellIndex& cell) noexcept {
-    const std::uint64_t owner = surface_.field->identity();
-    const auto is = [&](const CellPolynomial& c) {
-      return c.owner == owner && c.level == surface_.level && c.cell == cell;
-    };
-    if (!is(hint_.cell) && !is(hint_.other)) {
-      CellPolynomial& slot = hint_.other_last ? hint_.cell : hint_.other;
-      hint_.other_last = !hint_.other_last;
-      return surface_.field->load(surface_.level, cell, slot) ? &slot : nullptr;
-    }
-    hint_.other_last = !is(hint_.cell);
-    const CellPolynomial& found = hint_.other_last ? hint_.other : hint_.cell;
-    return found.known ? &found : nullptr;
+    CellPolynomial& slot = hint_.slot(surface_.field->identity(), surface_.level, cell);
+    return surface_.field->load(surface_.level, cell, slot) ? &slot : nullptr;
   }
 
   /// The cells that x lies in or on the border of: `first` … `last` along each axis.
@@ -119,15 +109,18 @@ class Leader {
     pull.cell = index;
     const CellPolynomial* cell = load(index);
     if (cell == nullptr) return pull;
+    // The projection that led here knows the gradient; within a cell the second derivatives change so little that those
+    // of the last move serve once more.
+    FieldJet jet;
     if (face < 0 && arrived_ && arrived_cell_ == index) {
-      // The projection that led here knows the gradient: where that tells that all is done, no more is needed.
-      Vec3 s;
-      double depth = 0.0;
-      double length = 0.0;
-      if (!aim(*cell, sign_ * arrived_gradient_, face, pull, s, depth, length) || pull.at_rest) return pull;
+      jet.gradient = arrived_gradient_;
+      jet.hessian = bend_;
+    } else {
+      ++descent_.moves;
+      jet = cell->jet(x_);
+      bend_ = jet.hessian;
+      bend_cell_ = index;
     }
-    ++descent_.moves;
-    const FieldJet jet = cell->jet(x_);
     Vec3 s;
     double depth = 0.0;
     double length = 0.0;
@@ -336,7 +329,7 @@ class Leader {
       y -= step;
       // Newton's next error is about the square of this one.
       if (length > close * close) continue;
-      arrived_ = true;
+      arrived_ = bend_cell_ == cell.cell;
       arrived_cell_ = cell.cell;
       arrived_gradient_ = jet.gradient;
       return true;
@@ -383,7 +376,9 @@ class Leader {
   std::uint32_t last_[3] = {};
   std::uint32_t node_[3] = {};  ///< along the axes on whose faces x lies
   bool on_face_[3] = {};
-  bool arrived_ = false;  ///< x was found by `project`, in arrived_cell_
+  Mat3 bend_ = Mat3::Zero();  ///< second derivatives of the last jet, in bend_cell_
+  CellIndex bend_cell_;
+  bool arrived_ = false;  ///< x was found by `project`, in arrived_cell_ = bend_cell_
   CellIndex arrived_cell_;
   Vec3 arrived_gradient_ = Vec3::Zero();
 };

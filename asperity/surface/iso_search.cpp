@@ -264,6 +264,8 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
   const GridAxes& axes = field->axes(level);
   const MinMaxOctree& octree = field->octree(level);
   CellWalk walk(axes, motion, start, end);
+  // Where it starts it mostly was at the last tick.
+  CellPolynomial& polynomial = hint.slot(field->identity(), level, walk.cell());
   double sign = 0.0;  // of value - threshold; 0: not known yet
   std::uint32_t leaf[3] = {no_index, no_index, no_index};
   for (bool more = true; more;) {
@@ -274,7 +276,8 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
       same_leaf = same_leaf && at == leaf[a];
       leaf[a] = at;
     }
-    if (!same_leaf && !(hint.cell.owner == field->identity() && hint.cell.cell == cell && hint.cell.level == level)) {
+    if (!same_leaf &&
+        !(polynomial.owner == field->identity() && polynomial.cell == cell && polynomial.level == level)) {
       const MinMaxOctree::Node node =
           octree.outermost(cell.at, [&](const MinMaxOctree::Node& n) { return field->may_cross(level, n, threshold); });
       if (!field->may_cross(level, node, threshold)) {
@@ -294,7 +297,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
         }
       }
     }
-    const CellSide side = field->approach(level, cell, threshold, hint.cell);
+    const CellSide side = field->approach(level, cell, threshold, polynomial);
     const double there = side == CellSide::above ? 1.0 : -1.0;
     if (side == CellSide::unknown || (side != CellSide::near && (sign == 0.0 || sign == there))) {
       sign = side == CellSide::unknown ? 0.0 : there;
@@ -302,8 +305,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
       continue;
     }
     // What passes the threshold right on a face is neither cell's; the next one shows that it has.
-    if (side != CellSide::near && !field->load(level, cell, hint.cell)) break;
-    const CellPolynomial& polynomial = hint.cell;
+    if (side != CellSide::near && !field->load(level, cell, polynomial)) break;
     if (sign == 0.0) {
       const double value = polynomial.value(motion.from + walk.entry() * (motion.to - motion.from));
       sign = value > threshold || (value == threshold && sigma > 0.0) ? 1.0 : -1.0;

@@ -188,7 +188,7 @@ FieldSample IsoSurface::eval(const Vec3& p, Hint& hint) const noexcept {
   if (!(length > 0.0)) return sample;
   sample.value = surface.sigma * (jet.value - threshold_) / length;
   sample.gradient = (surface.sigma / length) * jet.gradient;
-  sample.element = element_of(0, hint.iso.cell.cell);
+  sample.element = element_of(0, p);
   return sample;
 }
 

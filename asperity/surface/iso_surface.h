@@ -33,7 +33,8 @@ struct IsoView {
 
   /// Value and gradient of the field itself. False outside the volume and where nothing is known. [servo]
   bool sample(const Vec3& p, IsoHint& hint, FieldJet& out) const noexcept {
-    return field->sample(level, p, hint.cell, out);
+    if (!field->contains(p)) return false;
+    return field->sample(level, p, hint.slot(field->identity(), level, field->cell_of(level, p)), out);
   }
   /// The first place where the motion passes the threshold after fraction `from`, found cell by cell (Amanatides and
   /// Woo 1987) by the exact root of the cell's polynomial (Parker et al. 1998, Marmitt et al. 2004); cells that the

@@ -19,6 +19,16 @@ struct IsoHint {
   CellPolynomial cell;
   CellPolynomial other;
   bool other_last = false;  ///< `other` was used after `cell`
+  /// The one of the two that holds a cell, or else the one that was not used last. [servo]
+  CellPolynomial& slot(std::uint64_t owner, int level, const CellIndex& index) noexcept {
+    const auto holds = [&](const CellPolynomial& c) { return c.owner == owner && c.level == level && c.cell == index; };
+    if (holds(cell)) {
+      other_last = false;
+    } else {
+      other_last = holds(other) || !other_last;
+    }
+    return other_last ? other : cell;
+  }
   Vec3 foot = Vec3::Zero();
   bool has_foot = false;
 };
