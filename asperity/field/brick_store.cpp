@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 // How often the background thread looks where the probe is.
 constexpr auto poll_time = std::chrono::microseconds(500);
 // How far ahead it follows the probe's velocity, in how many steps.
-constexpr double horizon = 0.02;  // s
+constexpr double horizon = 0.015;  // s
 constexpr std::size_t path_points = 7;
 // Around the path, in bricks of each level: what is fetched at least, however fast the probe moves.
 constexpr double least_reach = 0.7;

@@ -79,11 +79,12 @@ class GridLine {
 };
 
 /// The field at a point; not-a-number where nothing is known.
-double value_at(const IsoView& view, const Vec3& p, CellPolynomial& cache) noexcept {
+double value_at(const IsoView& view, const Vec3& p, IsoHint& hint) noexcept {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  if (!view.field->contains(p) || !view.field->load(view.level, view.field->cell_of(view.level, p), cache))
-    return unknown;
-  return cache.value(p);
+  if (!view.field->contains(p)) return unknown;
+  const CellIndex cell = view.field->cell_of(view.level, p);
+  CellPolynomial& slot = hint.slot(view.field->identity(), view.level, cell);
+  return view.field->load(view.level, cell, slot) ? slot.value(p) : unknown;
 }
 
 /// Positive outside, negative inside; not-a-number where nothing is known.
@@ -98,13 +99,13 @@ bool walked_intersection(const IsoView& view, const Vec3& from, const Vec3& to, 
                          Vec3& out) noexcept {
   GridLine line(view, from, to);
   Vec3 last = line.point();
-  double last_phi = phi_of(view, value_at(view, last, hint.cell));
+  double last_phi = phi_of(view, value_at(view, last, hint));
   out = last;
   bool moved = false;
   while (line.advance()) {
     moved = true;
     const Vec3 here = line.point();
-    const double phi = phi_of(view, value_at(view, here, hint.cell));
+    const double phi = phi_of(view, value_at(view, here, hint));
     if ((last_phi < 0.0 && phi >= 0.0) || (last_phi >= 0.0 && phi < 0.0)) {
       out = std::abs(phi) < std::abs(last_phi) ? here : last;
       return true;
@@ -141,7 +142,7 @@ LawForce literal_force(const CrossUncrossLaw& law, const IsoView& view, double s
   do {
     const Vec3 here = path.point();
     const double before = phi_of(view, iso.value);
-    iso.value = value_at(view, here, state.hint.iso.cell);
+    iso.value = value_at(view, here, state.hint.iso);
     const double now = phi_of(view, iso.value);
     if (!(now <= 0.0)) {  // new > d0, or nothing known
       iso.crossed = false;
@@ -289,7 +290,7 @@ LawForce consistent_force(const CrossUncrossLaw& law, const IsoView& view, doubl
                           const Vec3& velocity, ContactState& state) noexcept {
   IsoContact& iso = state.iso;
   const double before = iso.started ? phi_of(view, iso.value) : std::numeric_limits<double>::quiet_NaN();
-  iso.value = value_at(view, probe, state.hint.iso.cell);
+  iso.value = value_at(view, probe, state.hint.iso);
   const double now = phi_of(view, iso.value);
   if (!iso.started || std::isnan(now)) {
     // Beyond the volume nobody knows on which side the probe is, until it is outside again.
@@ -341,7 +342,7 @@ LawForce cross_uncross_force(const CrossUncrossLaw& law, [[maybe_unused]] const 
   } else if (iso.started) {
     answer = literal_force(law, view, material.stiffness, probe, velocity, state);
   } else {
-    iso.value = value_at(view, probe, state.hint.iso.cell);
+    iso.value = value_at(view, probe, state.hint.iso);
   }
   iso.previous = probe;
   iso.started = true;
