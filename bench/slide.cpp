@@ -4,24 +4,32 @@
 
 namespace asperity::bench {
 
-Slide make_slide(const TriangleIndex& index, std::size_t ticks) {
-  Slide slide;
-  slide.direction.reserve(ticks);
-  slide.surface.reserve(ticks);
+std::vector<Vec3> wandering_directions(std::size_t ticks) {
+  std::vector<Vec3> directions;
+  directions.reserve(ticks);
   const double advance = slide_speed * tick_seconds / sphere_radius;
   Vec3 place = Vec3(0.3, 1.0, 0.2).normalized();
   Vec3 heading = place.cross(Vec3(1.0, 0.0, 0.0)).normalized();
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     const double travelled = advance * static_cast<double>(tick);
-    slide.direction.push_back(place);
-    const FirstHit hit = index.first_hit({2.0 * sphere_radius * place, Vec3::Zero()});
-    slide.surface.push_back(hit.face != no_index ? 2.0 * sphere_radius * (1.0 - hit.t) : sphere_radius);
+    directions.push_back(place);
     // Curvature that swings slowly keeps the slide from closing into a circle.
     const double turn = advance * (0.9 * std::sin(0.37 * travelled) + 0.6 * std::sin(1.13 * travelled));
     const Vec3 ahead = std::cos(advance) * place + std::sin(advance) * heading;
     const Vec3 onward = std::cos(advance) * heading - std::sin(advance) * place;
     place = ahead.normalized();
     heading = (std::cos(turn) * onward + std::sin(turn) * place.cross(onward)).normalized();
+  }
+  return directions;
+}
+
+Slide make_slide(const TriangleIndex& index, std::size_t ticks) {
+  Slide slide;
+  slide.direction = wandering_directions(ticks);
+  slide.surface.reserve(ticks);
+  for (const Vec3& place : slide.direction) {
+    const FirstHit hit = index.first_hit({2.0 * sphere_radius * place, Vec3::Zero()});
+    slide.surface.push_back(hit.face != no_index ? 2.0 * sphere_radius * (1.0 - hit.t) : sphere_radius);
   }
   return slide;
 }

@@ -23,6 +23,9 @@ struct Slide {
   }
 };
 
+/// The slide's directions, one a tick. [build]
+std::vector<Vec3> wandering_directions(std::size_t ticks);
+
 /// Errors: none; a mesh that a ray from the centre misses counts as 50 mm away there. [build]
 Slide make_slide(const TriangleIndex& index, std::size_t ticks);
 

@@ -57,19 +57,8 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Scalar
 /// The wandering slide of the meshes, on the sphere itself.
 std::shared_ptr<const Slide> wander(std::size_t ticks) {
   auto slide = std::make_shared<Slide>();
-  Vec3 place = Vec3(0.3, 1.0, 0.2).normalized();
-  Vec3 heading = place.cross(Vec3(1.0, 0.0, 0.0)).normalized();
-  const double advance = slide_speed * tick_seconds / sphere_radius;
-  for (std::size_t tick = 0; tick < ticks; ++tick) {
-    slide->direction.push_back(place);
-    slide->surface.push_back(sphere_radius);
-    const double travelled = advance * static_cast<double>(tick);
-    const double turn = advance * (0.9 * std::sin(0.37 * travelled) + 0.6 * std::sin(1.13 * travelled));
-    const Vec3 ahead = std::cos(advance) * place + std::sin(advance) * heading;
-    const Vec3 onward = std::cos(advance) * heading - std::sin(advance) * place;
-    place = ahead.normalized();
-    heading = (std::cos(turn) * onward + std::sin(turn) * place.cross(onward)).normalized();
-  }
+  slide->direction = wandering_directions(ticks);
+  slide->surface.assign(ticks, sphere_radius);
   return slide;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "asperity/surface/iso_descent.h"
 
@@ -195,7 +196,12 @@ class NearestSearch {
     // Within the cell the surface is looked for from its place nearest to p, towards its middle and its corners.
     const CellPolynomial here = cell;
     const Vec3 start = p_.cwiseMax(here.lower).cwiseMin(here.upper());
-    const double sign = here.value(start) >= surface_.threshold ? 1.0 : -1.0;
+    // From there the field has to change by `off` before the surface is reached, no faster than its steepest slope; and
+    // within a box the way on from the place nearest to p never leads back towards p.
+    const double off = here.value(start) - surface_.threshold;
+    const double rise = off / steepest(here);
+    if ((p_ - start).squaredNorm() + rise * rise >= best_ * best_) return;
+    const double sign = off >= 0.0 ? 1.0 : -1.0;
     for (int corner = -1; corner < 8; ++corner) {
       Vec3 end = here.lower + 0.5 * here.width;
       for (int a = 0; corner >= 0 && a < 3; ++a)
@@ -206,6 +212,18 @@ class NearestSearch {
       if ((root - p_).norm() - here.width.norm() < best_) lead(root);
       return;
     }
+  }
+
+  /// Bound on the gradient's length in a cell, above 0.
+  static double steepest(const CellPolynomial& cell) noexcept {
+    double squared = std::numeric_limits<double>::min();
+    for (int a = 0; a < 3; ++a) {
+      double least = 0.0;
+      double greatest = 0.0;
+      cell.slope_range(Vec3::Unit(a), least, greatest);
+      squared += std::max(least * least, greatest * greatest);
+    }
+    return std::sqrt(squared);
   }
 
   /// Newton along the gradient onto the surface, then along it to the nearest point.

@@ -56,6 +56,17 @@ inline std::shared_ptr<const ScalarField> random_field(std::uint32_t count, Cell
       sampled(cube_axes(0.05, count, stretch), [&](const Vec3&) { return value(generator); }), reconstruction);
 }
 
+/// A wall across z in a cube of +-10 mm with cells of 1 mm whose two faces, at the value 0, lie within one cell:
+/// samples dip below 0 in one layer only.
+inline std::shared_ptr<const ScalarField> thin_wall(CellReconstruction reconstruction) {
+  const GridAxis axis = GridAxis::uniform(-0.01, 0.001, 21).value();
+  constexpr std::size_t layer = 21 * 21;
+  std::vector<float> samples(layer * 21, 1.0F);
+  for (std::size_t i = 10 * layer; i < 11 * layer; ++i) samples[i] = -0.02F;
+  return std::make_shared<const ScalarField>(
+      ScalarGrid::build({axis, axis, axis}, SampleArray(std::move(samples))).value(), reconstruction);
+}
+
 inline Vec3 random_point(std::mt19937_64& generator, double half) {
   std::uniform_real_distribution<double> unit(-half, half);
   const double x = unit(generator);

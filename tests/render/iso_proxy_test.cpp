@@ -223,13 +223,7 @@ TEST_P(IsoProxyEach, T5_no_speed_passes_nested_shells) {
 }
 
 TEST_P(IsoProxyEach, T5_wall_thinner_than_a_cell_holds_on_both_sides) {
-  const GridAxis axis = *GridAxis::uniform(-0.01, 0.001, 21);
-  std::vector<float> samples(21 * 21 * 21, 1.0F);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (i / (21 * 21) == 10) samples[i] = -0.02F;
-  }
-  const auto field = std::make_shared<const ScalarField>(
-      ScalarGrid::build({axis, axis, axis}, SampleArray(samples)).value(), GetParam());
+  const auto field = thin_wall(GetParam());
   const Scene scene = scene_of(iso_instance(field, 0.0));
   for (const double side : {1.0, -1.0}) {
     ProxyState state;

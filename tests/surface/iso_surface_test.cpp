@@ -63,14 +63,7 @@ TEST_P(IsoEach, T5_first_crossing_is_that_of_fine_steps_on_rough_fields) {
 }
 
 TEST_P(IsoEach, M_3_no_speed_passes_a_sheet_thinner_than_a_cell) {
-  // A wall whose two sides lie within one cell: values dip below 0 at one layer of samples only.
-  const GridAxis axis = *GridAxis::uniform(-0.01, 0.001, 21);
-  std::vector<float> samples(21 * 21 * 21, 1.0F);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (i / (21 * 21) == 10) samples[i] = -0.02F;
-  }
-  const auto field = std::make_shared<const ScalarField>(
-      ScalarGrid::build({axis, axis, axis}, SampleArray(samples)).value(), GetParam());
+  const auto field = thin_wall(GetParam());
   const IsoSurface surface = IsoSurface::build(field, 0.0, Inside::low).value();
   std::mt19937_64 generator(2);
   std::uniform_real_distribution<double> side(-0.009, 0.009);
