@@ -284,6 +284,55 @@ bool first_zero(const double* coefficients, double tolerance, double& t) noexcep
   return false;
 }
 
+/// The one root of f between t0, where it is above 0, and t1, where it is below: regula falsi after Illinois, halving
+/// where that stands still.
+template <class F>
+double bracketed_root(const F& f, double t0, double f0, double t1, double f1) noexcept {
+  constexpr int most_rounds = 60;
+  const double close = 1e-14 * (t1 - t0);
+  double low = t0;
+  double high = t1;
+  double f_low = f0;
+  double f_high = f1;
+  for (int round = 0; round < most_rounds && high - low > close; ++round) {
+    double middle = low + (high - low) * (f_low / (f_low - f_high));
+    if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
+    if (!(middle > low && middle < high)) break;
+    const double there = f(middle);
+    if (there >= 0.0) {
+      low = middle;
+      f_low = there;
+      f_high *= round % 2 == 0 ? 1.0 : 0.5;
+    } else {
+      high = middle;
+      f_high = there;
+      f_low *= round % 2 == 0 ? 1.0 : 0.5;
+    }
+    if (there == 0.0) break;
+  }
+  return low;
+}
+
+/// The first zero between t0 and t1 of a polynomial with as many coefficients as `from` has rows, as a fraction.
+template <class F, int Count>
+bool first_zero_of(const F& f, const FromValues<Count>& from, double t0, double f0, double t1, double f1,
+                   double& found) noexcept {
+  constexpr auto size = static_cast<std::size_t>(Count);
+  constexpr double close = 1e-7;
+  double values[size];
+  double c[size];
+  values[0] = f0;
+  values[size - 1] = f1;
+  for (int i = 1; i + 1 < Count; ++i) values[i] = f(t0 + (t1 - t0) * i / (Count - 1));
+  for (int row = 0; row < Count; ++row) {
+    c[row] = 0.0;
+    for (int i = 0; i < Count; ++i) c[row] += from.weight[row][i] * values[i];
+  }
+  c[0] = f0;
+  c[size - 1] = f1;
+  return first_zero<Count>(c, close, found);
+}
+
 }  // namespace
 
 void CellPolynomial::finish() noexcept {
@@ -352,62 +401,14 @@ bool CellPolynomial::leaves_sign(const Vec3& a, const Vec3& b, double t0, double
     const double cut = (f1 - f0 - greatest * length) / (least - greatest);
     if (f0 + least * cut > 0.0) return false;
   } else if (greatest <= 0.0 || least >= 0.0) {
-    // Monotone: the one root between the ends (Illinois' regula falsi, then halving).
-    double low = t0;
-    double high = t1;
-    double f_low = f0;
-    double f_high = f1;
-    for (int round = 0; round < 60 && high - low > 1e-14 * length; ++round) {
-      double middle = low + (high - low) * (f_low / (f_low - f_high));
-      if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
-      if (!(middle > low && middle < high)) break;
-      const double value_there = f(middle);
-      if (value_there >= 0.0) {
-        low = middle;
-        f_low = value_there;
-        f_high *= round % 2 == 0 ? 1.0 : 0.5;
-      } else {
-        high = middle;
-        f_high = value_there;
-        f_low *= round % 2 == 0 ? 1.0 : 0.5;
-      }
-      if (value_there == 0.0) break;
-    }
-    t = low;
+    t = bracketed_root(f, t0, f0, t1, f1);
     return true;
   }
   double found = 0.0;
-  const double step = length;
-  bool reaches = false;
-  if (degree == 1) {
-    double values[4];
-    double c[4];
-    values[0] = f0;
-    values[3] = f1;
-    for (int i = 1; i < 3; ++i) values[i] = f(t0 + step * i / 3.0);
-    for (int row = 0; row < 4; ++row) {
-      c[row] = 0.0;
-      for (int i = 0; i < 4; ++i) c[row] += from_4_values.weight[row][i] * values[i];
-    }
-    c[0] = f0;
-    c[3] = f1;
-    reaches = first_zero<4>(c, 1e-7, found);
-  } else {
-    double values[10];
-    double c[10];
-    values[0] = f0;
-    values[9] = f1;
-    for (int i = 1; i < 9; ++i) values[i] = f(t0 + step * i / 9.0);
-    for (int row = 0; row < 10; ++row) {
-      c[row] = 0.0;
-      for (int i = 0; i < 10; ++i) c[row] += from_10_values.weight[row][i] * values[i];
-    }
-    c[0] = f0;
-    c[9] = f1;
-    reaches = first_zero<10>(c, 1e-7, found);
-  }
+  const bool reaches = degree == 1 ? first_zero_of(f, from_4_values, t0, f0, t1, f1, found)
+                                   : first_zero_of(f, from_10_values, t0, f0, t1, f1, found);
   if (!reaches) return false;
-  t = t0 + step * found;
+  t = t0 + length * found;
   return true;
 }
 
