@@ -127,7 +127,8 @@ ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string
   for (const auto& item : json.items()) {
     if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
     const std::string near = nearest_name(item.key(), known);
-    std::string what = "is not a key of a " + std::string(object);
+    const bool vowel = object.find_first_of("aeiou") == 0;
+    std::string what = std::string(vowel ? "is not a key of an " : "is not a key of a ") + std::string(object);
     if (!near.empty()) what += fmt::format("; did you mean \"{}\"?", near);
     fail(item.key(), std::move(what), fmt::format("{}", fmt::join(known, ", ")), ErrorCode::bad_key);
     return;
