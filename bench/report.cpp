@@ -24,7 +24,8 @@ void add_ratio(std::vector<Ratio>& ratios, const Group& group, const char* numer
 }
 
 /// What a row costs on the base, or in the volume, where it costs most, compared with the one where it costs least.
-void add_flatness(std::vector<Ratio>& ratios, const std::vector<Group>& groups, const char* kind, const char* of) {
+void add_flatness(std::vector<Ratio>& ratios, const std::vector<Group>& groups, const char* kind, const char* of,
+                  double bar) {
   const auto first = std::find_if(groups.begin(), groups.end(), [&](const Group& group) { return group.kind == kind; });
   if (first == groups.end()) return;
   for (const RowResult& row : first->rows) {
@@ -39,7 +40,7 @@ void add_flatness(std::vector<Ratio>& ratios, const std::vector<Group>& groups, 
       most = std::max(most, same->warm.p50);
     }
     if (least > 0.0 && sizes > 2)
-      ratios.push_back({fmt::format("{}: dearest / cheapest {}", row.name, of), most / least, 1.5, 15.0});
+      ratios.push_back({fmt::format("{}: dearest / cheapest {}", row.name, of), most / least, bar, 15.0});
   }
 }
 
@@ -78,6 +79,10 @@ std::string text_of(const Group& group) {
     text +=
         fmt::format("{:.1f} MB; made in {:.3f} s, octree in {:.3f} s\n", static_cast<double>(group.coat_bytes) * 1e-6,
                     group.mesh_build_seconds, group.search_build_seconds);
+  } else if (group.kind == "potential") {
+    text = fmt::format("\n{} of {}: {:.1f} MB; mesh and search structure in {:.3f} s, potential in {:.3f} s\n",
+                       group.kind, group.size(), static_cast<double>(group.coat_bytes) * 1e-6, group.mesh_build_seconds,
+                       group.search_build_seconds);
   } else if (group.coat_bytes > 0) {
     text += fmt::format(", coat {:.1f} MB\n", static_cast<double>(group.coat_bytes) * 1e-6);
   } else {
@@ -111,8 +116,9 @@ std::vector<Ratio> Report::ratios() const {
     add_ratio(ratios, group, closest_coherent, embree_bounded, 0.0, 4.0);
     add_ratio(ratios, group, proxy_edge, proxy_inside, 2.0, 20.0);
   }
-  add_flatness(ratios, groups, "relief", "base");
-  add_flatness(ratios, groups, "volume", "volume");
+  add_flatness(ratios, groups, "relief", "base", 1.5);
+  add_flatness(ratios, groups, "volume", "volume", 1.5);
+  add_flatness(ratios, groups, "potential", "mesh", 1.25);
   return ratios;
 }
 

@@ -23,9 +23,11 @@ inline constexpr const char* proxy_cosine = "proxy, cosine, UVs";
 inline constexpr const char* proxy_inside = "proxy, per face, inside a face";
 inline constexpr const char* proxy_edge = "proxy, per face, along an edge";
 
+inline constexpr const char* contact_point_friction = "virtual contact point, friction, smooth";
+
 /// What was measured on one mesh.
 struct Group {
-  std::string kind;  ///< "mesh", "relief" or "volume"
+  std::string kind;  ///< "mesh", "relief", "volume" or "potential"
   std::size_t triangles = 0;
   std::uint32_t resolution = 0;       ///< of a volume: samples along each axis
   double mesh_build_seconds = 0.0;    ///< welding, checks, adjacency, normals
@@ -53,5 +55,9 @@ Result<Group> measure_relief(int subdivisions, int map_size, const Effort& effor
 /// A sphere of 50 mm, slightly wavy, as the isosurface of count^3 samples over a cube of 120 mm: the proxy law with
 /// friction 0.3 / 0.2, cross-uncross and avila, and the search for a crossing alone. [build]
 Result<Group> measure_volume(std::uint32_t count, const Effort& effort, double clock_cost);
+
+/// The same mesh as a potential on voxels of 0.78 mm, 128 across, whatever the count of its triangles: the virtual
+/// contact point with and without friction and as printed, the proxy law, and the sampling alone. [build]
+Result<Group> measure_potential(int subdivisions, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

@@ -25,9 +25,36 @@ struct CompareOptions {
   bool one_way = false;
 };
 
+/// Surface kinds that a law's name may start with.
+constexpr const char* kinds[] = {"mesh", "relief", "implicit"};
+
+/// "implicit/proxy": a law, and what the meshes of the scene are felt through; without a kind, as the scene has them.
+struct Rival {
+  std::string name;
+  std::string kind;
+  std::string law;
+};
+
+Rival parse_rival(const std::string& name) {
+  for (const char* kind : kinds) {
+    const std::string prefix = std::string(kind) + "/";
+    if (name.starts_with(prefix)) return {name, kind, name.substr(prefix.size())};
+  }
+  return {name, {}, name};
+}
+
 std::vector<std::string> default_laws(const Scene& scene) {
   if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
   for (const Instance& instance : scene.instances()) {
+    if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
+      if (implicit->mesh() == nullptr)
+        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "avila"};
+      if (implicit->textured())
+        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "normal-perturbation"};
+      return {
+          "mesh/proxy", "mesh/force-shading-literal", "proxy", "virtual-contact-point", "virtual-contact-point-literal",
+          "avila"};
+    }
     if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
   }
   return {"proxy", "mesostructure", "height-field", "force-shading"};
@@ -40,14 +67,73 @@ struct Column {
   std::vector<TraceRecord> records;
 };
 
-Result<Column> run_law(const Experiment& experiment, const std::string& name, const Progress& progress) {
-  Result<Law> law = law_by_name(name);
+/// The scene in every representation that is asked for, each made once, all on one stroke.
+class Representations {
+ public:
+  Representations(const CompareOptions& options, const Experiment& plain, const Progress& progress)
+      : options_(options), plain_(plain), progress_(progress) {}
+
+  Result<const Experiment*> find(const std::string& kind) {
+    if (kind.empty()) return &plain_;
+    for (const auto& [name, experiment] : made_) {
+      if (name == kind) return experiment.get();
+    }
+    SceneArgument argument = options_.scene;
+    argument.felt_as = kind;
+    Result<Experiment> made = load_scene(argument, progress_, !options_.one_way);
+    if (!made) return std::move(made).error();
+    // What differs is how it is felt; the hand does the same.
+    made->path = plain_.path;
+    made_.emplace_back(kind, std::make_unique<Experiment>(std::move(made).value()));
+    return made_.back().second.get();
+  }
+
+  /// The exact geometry that potentials are judged by: the relief where there are coats, else the mesh. nullptr where
+  /// nothing implicit has a mesh.
+  Result<const Scene*> exact(const std::vector<Rival>& rivals) {
+    bool implicit = false;
+    for (const Rival& rival : rivals) {
+      ASPERITY_TRY(const Experiment* experiment, find(rival.kind));
+      for (const Instance& instance : experiment->scene.instances()) {
+        const ImplicitSurface* surface = implicit_of(instance.surface);
+        if (surface == nullptr) continue;
+        if (surface->mesh() == nullptr) return nullptr;
+        implicit = true;
+        reach_ = std::min(reach_, edge_reach_of(experiment->scene));
+      }
+    }
+    if (!implicit) return nullptr;
+    ASPERITY_TRY(const Experiment* relief, find("relief"));
+    return &relief->scene;
+  }
+  /// From the edge: a law without a proxy feels where the probe is, as deep as it is pressed in.
+  [[nodiscard]] double edge_reach() const {
+    double depth = 0.0;
+    for (const Instance& instance : plain_.scene.instances()) {
+      const StrokeSettings& stroke = plain_.stroke;
+      depth = std::max(
+          depth, stroke.press == PressMode::force ? stroke.normal_force / instance.material.stiffness : stroke.depth);
+    }
+    return reach_ + depth;
+  }
+
+ private:
+  const CompareOptions& options_;
+  const Experiment& plain_;
+  const Progress& progress_;
+  std::vector<std::pair<std::string, std::unique_ptr<Experiment>>> made_;
+  double reach_ = SeriesSettings{}.edge_reach;
+};
+
+Result<Column> run_law(const Experiment& experiment, const Rival& rival, const SeriesSettings& judged,
+                       const Progress& progress) {
+  Result<Law> law = law_by_name(rival.law);
   if (!law) return std::move(law).error().at("--laws");
   ASPERITY_TRY(const Experiment changed, with_law(experiment, *law));
   ASPERITY_TRY(RunResult run, run_experiment(changed, {}, progress));
   Column column;
-  column.entry.law = law_name(*law);
-  column.entry.series = derive_series(run.records, changed.scene, changed.path);
+  column.entry.law = rival.name;
+  column.entry.series = derive_series(run.records, changed.scene, changed.path, judged);
   column.entry.metrics = measure_run(run.records, column.entry.series, changed.path);
   column.hash = run.hash;
   column.records = std::move(run.records);
@@ -67,17 +153,28 @@ std::string number(double value, const char* format) {
 void print_table(const Experiment& experiment, const std::vector<Column>& columns) {
   std::cout << fmt::format("scene {}: {}\n", experiment.name, setup_facts(experiment).back().value);
   const bool follows = followed_instance(experiment.scene) != nullptr;
-  std::cout << fmt::format("{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}{}\n", "law", "direction", "height", "jump",
+  bool edges = false;
+  std::size_t widest = 24;
+  for (const Column& column : columns) {
+    edges = edges || column.entry.metrics.direction_near.samples > 0;
+    widest = std::max(widest, column.entry.law.size() + 2);
+  }
+  std::cout << fmt::format("{:<{}}{:>12}{}{:>12}{:>12}{:>14}{:>12}{}\n", "law", widest, "direction",
+                           edges ? fmt::format("{:>12}{:>12}", "near edges", "elsewhere") : "", "height", "jump",
                            "energy/loop", "update p50", follows ? fmt::format("{:>12}{:>12}", "follow", "max") : "");
   for (const Column& column : columns) {
     const RunMetrics& m = column.entry.metrics;
     constexpr double degrees = 57.29577951308232;
     const auto share = [](double value) { return number(value * 100.0, "{:.3g} %"); };
-    std::cout << fmt::format(
-        "{:<24}{:>12}{:>12}{:>12}{:>14}{:>12}{}\n", column.entry.law, number(m.direction.mean * degrees, "{:.2f} deg"),
-        number(m.height.relative_error * 100.0, "{:.2f} %"), number(m.force.largest_jump, "{:.3g} N"),
-        number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"), format_seconds(m.update.p50),
-        follows ? fmt::format("{:>12}{:>12}", share(m.follow.global), share(m.follow.max)) : "");
+    const auto angle = [](const DirectionMetrics& d) {
+      return d.samples > 0 ? number(d.mean * degrees, "{:.2f} deg") : std::string("-");
+    };
+    std::cout << fmt::format("{:<{}}{:>12}{}{:>12}{:>12}{:>14}{:>12}{}\n", column.entry.law, widest, angle(m.direction),
+                             edges ? fmt::format("{:>12}{:>12}", angle(m.direction_near), angle(m.direction_far)) : "",
+                             number(m.height.relative_error * 100.0, "{:.2f} %"),
+                             number(m.force.largest_jump, "{:.3g} N"), number(m.energy.mean_loop * 1e3, "{:+.3g} mJ"),
+                             format_seconds(m.update.p50),
+                             follows ? fmt::format("{:>12}{:>12}", share(m.follow.global), share(m.follow.max)) : "");
   }
 }
 
@@ -118,6 +215,16 @@ void print_loop_rates(const std::vector<LoopRateRow>& rows, const std::vector<Co
   }
 }
 
+/// How long a tick takes over the size of the scene's volumes.
+Result<std::vector<LoopRateRow>> rates_of(const Experiment& experiment, const std::vector<Rival>& rivals,
+                                          const Progress& progress) {
+  if (followed_instance(experiment.scene) == nullptr) return std::vector<LoopRateRow>{};
+  if (progress) progress("measuring the loop rate", 0.0);
+  std::vector<Law> felt;
+  for (const Rival& rival : rivals) felt.push_back(law_by_name(rival.law).value());
+  return loop_rates(experiment.scene, experiment.path, felt, experiment.rate);
+}
+
 Json loop_rate_json(const std::vector<LoopRateRow>& rows) {
   Json list = Json::array();
   for (const LoopRateRow& row : rows)
@@ -143,25 +250,27 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress, !options.one_way));
   const fs::path folder =
       options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
-  std::vector<Column> columns;
-  const std::vector<std::string> laws = options.laws.empty() ? default_laws(experiment.scene) : options.laws;
+  std::vector<Rival> rivals;
+  for (const std::string& name : options.laws.empty() ? default_laws(experiment.scene) : options.laws)
+    rivals.push_back(parse_rival(name));
   // Every pair is checked before anything is run or written.
-  for (const std::string& name : laws) {
-    Result<Law> law = law_by_name(name);
+  Representations representations(options, experiment, progress);
+  for (const Rival& rival : rivals) {
+    Result<Law> law = law_by_name(rival.law);
     if (!law) return std::move(law).error().at("--laws");
-    if (auto changed = with_law(experiment, *law); !changed) return std::move(changed).error();
+    ASPERITY_TRY(const Experiment* felt, representations.find(rival.kind));
+    if (auto changed = with_law(*felt, *law); !changed) return std::move(changed).error();
   }
+  ASPERITY_TRY(const Scene* exact, representations.exact(rivals));
   ASPERITY_CHECK(check_length(experiment));
   ASPERITY_CHECK(make_output_folder(folder.string()));
-  for (const std::string& name : laws) {
-    ASPERITY_TRY(Column column, run_law(experiment, name, progress));
+  std::vector<Column> columns;
+  for (const Rival& rival : rivals) {
+    ASPERITY_TRY(const Experiment* felt, representations.find(rival.kind));
+    ASPERITY_TRY(Column column, run_law(*felt, rival, {exact, representations.edge_reach()}, progress));
     columns.push_back(std::move(column));
   }
-  if (progress) progress("measuring the loop rate", 0.0);
-  std::vector<Law> felt;
-  for (const std::string& name : laws) felt.push_back(law_by_name(name).value());
-  ASPERITY_TRY(const std::vector<LoopRateRow> rates,
-               loop_rates(experiment.scene, experiment.path, felt, experiment.rate));
+  ASPERITY_TRY(const std::vector<LoopRateRow> rates, rates_of(experiment, rivals, progress));
   ASPERITY_TRY(const std::vector<DetectionRow> detection, detect_layers(experiment));
   Json document{{"program", program_name()},
                 {"command", console.command_line},
@@ -205,7 +314,10 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
   CLI::App* command = app.add_subcommand("compare", "Put several laws side by side on one scene and stroke");
   auto options = std::make_shared<CompareOptions>();
   add_scene_options(*command, options->scene);
-  command->add_option("--laws", options->laws, "Laws, separated by commas; default: those that suit the scene")
+  command
+      ->add_option("--laws", options->laws,
+                   "Laws, separated by commas; default: those that suit the scene. mesh/LAW, relief/LAW, implicit/LAW: "
+                   "meshes felt through that representation")
       ->delimiter(',');
   command->add_flag("--one-way", options->one_way,
                     "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
@@ -218,10 +330,13 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
       "true relief, of what was\n"
       "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "
       "time of one tick. follow, max: on an isosurface, the error of eq. 20 over the path and the largest of a tick.\n"
+      "A mesh felt through a potential is judged by its exact geometry; near edges: within 1.5 voxels and the "
+      "depth pressed of edges that fold by 20 degrees or more.\n"
       "On an isosurface a second table says which share of straight passages through a layer each law notices at the "
       "scene's rate.\n"
       "Examples:\n"
       "  asperity compare M_a-H_3 --laws proxy,mesostructure,force-shading\n"
+      "  asperity compare bunny.obj --implicit --laws mesh/proxy,proxy,virtual-contact-point\n"
       "  asperity compare groove --laws mesostructure-literal,mesostructure\n"
       "  asperity compare bunny.obj --relief rock.png --height 1mm --json");
   command->callback(

@@ -1,4 +1,5 @@
-// asperity convert: a volume into a bricked file, which is touched without being held in memory.
+// asperity convert: a volume into a bricked file, which is touched without being held in memory; a mesh into a level
+// set.
 
 #include <fmt/format.h>
 
@@ -13,10 +14,12 @@
 #include <vector>
 
 #include "apps/asperity/command.h"
+#include "apps/asperity/convert_mesh.h"
 #include "asperity/core/units.h"
 #include "asperity/field/brick_file.h"
 #include "asperity/field/derived_fields.h"
 #include "asperity/field/volume_generators.h"
+#include "asperity/io/sparse_io.h"
 #include "asperity/io/volume_io.h"
 
 namespace asperity::program {
@@ -32,6 +35,11 @@ struct ConvertOptions {
   std::string fit;
   std::string generator;
   std::string size;
+  MeshConversion mesh;
+  /// What is said of volumes alone.
+  [[nodiscard]] bool of_volumes() const {
+    return !(array + component + derive + time + units + fit + generator + size).empty();
+  }
 };
 
 using Samples = std::variant<ScalarGrid, VectorGrid>;
@@ -194,6 +202,14 @@ Status check(const ConvertOptions& options) {
 }
 
 Result<int> convert(const ConvertOptions& options, const Console& console) {
+  if (options.files.size() == 2 && is_sparse_path(options.files.back())) {
+    if (options.of_volumes())
+      return refused("FILES", "a mesh is made into a level set", "the options of meshes: --resolution, --voxel, ...");
+    return convert_mesh_file(options.files.front(), options.files.back(), options.mesh, console);
+  }
+  if (options.mesh.any())
+    return refused("FILES", fmt::format("\"{}\" is no level set", options.files.back()),
+                   "a name with .vdb for a mesh, without --resolution and the like for a volume");
   ASPERITY_CHECK(check(options));
   const auto begin = std::chrono::steady_clock::now();
   ASPERITY_TRY(const BrickFileSummary summary,
@@ -221,12 +237,14 @@ Result<int> convert(const ConvertOptions& options, const Console& console) {
 
 CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
   CLI::App* command =
-      app.add_subcommand("convert", "Write a volume as a bricked file, which is touched without being held in memory");
+      app.add_subcommand("convert",
+                         "Write a volume as a bricked file (.aspvol), which is touched without being held in "
+                         "memory; or a mesh as a level set (.vdb)");
   auto options = std::make_shared<ConvertOptions>();
   command
       ->add_option("FILES", options->files,
                    "The volume (.vtk, .vti, .vtr, .nrrd, .json sidecar, ...) and the .aspvol file to write; with "
-                   "--generator only the latter")
+                   "--generator only the latter. Or a mesh and the .vdb file to write")
       ->required()
       ->expected(1, 2);
   command->add_option("--array", options->array, "Which array of the volume");
@@ -240,12 +258,24 @@ CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
                       "A built-in volume: sphere, shells, ramp, waves, gyroid, cavity");
   command->add_option("--size", options->size,
                       "Of a built-in volume: nodes along all axes, or along each: 1024, 259x127x128");
+  MeshConversion& mesh = options->mesh;
+  command->add_option("--resolution", mesh.resolution, "Of a mesh: voxels along its longest side (256)")->group("Mesh");
+  command->add_option("--voxel", mesh.voxel, "Of a mesh: the voxel, in its file's unit")->group("Mesh");
+  command->add_option("--budget", mesh.budget, "Of a mesh: the finest voxel that takes at most this: 64MB")
+      ->group("Mesh");
+  command->add_option("--band-outside", mesh.band_outside, "How far out distances are stored (3 voxels)")
+      ->group("Mesh");
+  command->add_option("--band-inside", mesh.band_inside, "How far in, or all (3 voxels)")->group("Mesh");
+  command->add_option("--inside", mesh.inside, "What is inside: automatic, flood, winding, shell")->group("Mesh");
+  command->add_option("--shell-thickness", mesh.shell_thickness, "Of the shell around open sheets (2 voxels)")
+      ->group("Mesh");
   add_console_options(*command, console);
   command->footer(
       "Volumes are read whole into memory; built-in ones are written slab by slab, whatever their size.\n"
       "Examples:\n"
       "  asperity convert flow.vtr vortices.aspvol --array velocity --derive q_criterion --units mm\n"
       "  asperity convert scan.json scan.aspvol --fit 15cm\n"
+      "  asperity convert bunny.obj bunny.vdb --resolution 512\n"
       "  asperity convert --generator sphere --size 1024 sphere.aspvol");
   command->callback(
       [options, &console, &action] { action = [options, &console] { return convert(*options, console); }; });

@@ -104,6 +104,28 @@ void crest_line(const Coat& coat, double force, double stiffness, std::vector<st
   }
 }
 
+/// What the voxels and the stored band let through.
+void potential_lines(const ImplicitSurface& surface, const Instance& instance, double force,
+                     std::vector<std::string>& lines) {
+  const double voxel = surface.grid().voxel();
+  lines.push_back(
+      fmt::format("edges are rounded within about {}; texture is felt to its full height from waves of {} on "
+                  "(6 voxels)",
+                  format_length(1.5 * voxel), format_length(6.0 * voxel)));
+  if (constrains(instance.law)) return;
+  const double depth = force / instance.material.stiffness;
+  if (depth > surface.reach_inside()) {
+    lines.push_back(
+        fmt::format("the stroke presses {} deep, and the potential is stored {} inside: from there on the "
+                    "force no longer rises (implicit.band_inside)",
+                    format_length(depth), format_length(-surface.grid().inside())));
+  }
+  lines.push_back(
+      fmt::format("parts thinner than {} let this law's probe through at {:.3g} N (an offset, or the law "
+                  "\"proxy\", holds it)",
+                  format_length(2.0 * depth), force));
+}
+
 }  // namespace
 
 std::vector<std::string> feel_of(const Experiment& experiment, const Instance& instance) {
@@ -126,6 +148,8 @@ std::vector<std::string> feel_of(const Experiment& experiment, const Instance& i
     amplitude_line(coat, experiment, stiffness, lines);
     detail_lines(coat, experiment, lines);
     crest_line(coat, force, stiffness, lines);
+  } else if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
+    potential_lines(*implicit, instance, force, lines);
   } else if (const IsoSurface* iso = iso_of(instance.surface)) {
     lines.push_back(fmt::format("the isosurface has no detail below its cells of {}",
                                 format_length(iso->field().narrowest_cell())));

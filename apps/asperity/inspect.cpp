@@ -1,6 +1,7 @@
 // asperity inspect: what a file is, what is wrong with it, and what can be felt of it on which device.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -15,6 +16,7 @@
 #include "asperity/field/image.h"
 #include "asperity/io/image_io.h"
 #include "asperity/io/mesh_io.h"
+#include "asperity/io/sparse_io.h"
 #include "asperity/io/trace_file.h"
 #include "asperity/io/volume_io.h"
 
@@ -198,6 +200,30 @@ Result<Findings> inspect_volume(const InspectOptions& options, const Progress& p
   return found;
 }
 
+/// A .vdb file as it is, then what can be felt of it with the defaults.
+Result<Findings> inspect_sparse(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(SparseFile file, read_sparse(options.file, {}, progress));
+  Findings found{"level set", {}, {}, {}};
+  for (const SparseGridEntry& entry : file.entries) {
+    found.fact(fmt::format("grid \"{}\"", entry.name),
+               fmt::format("{}, {}, {} points, voxel {:.6g}", entry.type, entry.grid_class, entry.points, entry.voxel));
+  }
+  found.fact("looked at", fmt::format("\"{}\"", file.grid));
+  found.fact("voxel", fmt::format("{:.6g} of the file's unit", file.source.voxel));
+  found.fact("band", fmt::format("{:.6g} outside to {:.6g} inside", file.source.outside, -file.source.inside));
+  found.fact("closest faces", file.has_faces ? fmt::format("yes, of {} triangles", file.mesh_faces) : "no");
+  found.fact("materials",
+             file.channels.empty() ? std::string("none") : fmt::format("{}", fmt::join(file.channels, ", ")));
+  for (const std::string& note : file.notes) found.problems.push_back(note);
+  ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
+  for (const ReportFact& fact : scene.facts) {
+    if (fact.name.starts_with("surface") || fact.name == "device")
+      found.facts.push_back({"as a scene: " + fact.name, fact.value});
+  }
+  found.felt = scene.felt;
+  return found;
+}
+
 Result<Findings> inspect_bricks(const std::string& file) {
   BrickSettings settings;
   settings.stream = false;
@@ -222,6 +248,7 @@ Result<Findings> inspect_any(InspectOptions options, const Progress& progress) {
   options.scene.scene = options.file;
   std::error_code ignored;
   if (fs::exists(options.file, ignored) && is_bricked_path(options.file)) return inspect_bricks(options.file);
+  if (fs::exists(options.file, ignored) && is_sparse_path(options.file)) return inspect_sparse(options, progress);
   if (fs::exists(options.file, ignored) && is_volume_path(options.file)) return inspect_volume(options, progress);
   if (fs::is_regular_file(options.file, ignored)) {
     if (is_trace_file(options.file)) return inspect_trace(options.file);
@@ -266,8 +293,11 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
       "inspect", "Say what a mesh, map, volume, scene or trace is, what is wrong with it, and what can be felt of it");
   auto options = std::make_shared<InspectOptions>();
   command
-      ->add_option("FILE", options->file, "A mesh, a map (PNG, JPEG), a volume, a scene, a built-in scene or a trace")
+      ->add_option("FILE", options->file,
+                   "A mesh, a map (PNG, JPEG), a volume, a level set (.vdb), a scene, a built-in scene or a trace")
       ->required();
+  command->add_flag("--implicit{256}", options->scene.implicit,
+                    "Of a mesh: judge the potential made from it (--implicit=128, --implicit=0.4mm)");
   command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
   command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
   command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");

@@ -81,7 +81,29 @@ std::string volume_fact(const IsoSurface& iso) {
   return text;
 }
 
+/// "potential of 28,576 triangles on voxels of 0.39 mm, 4,210 bricks (29 MB, dense 134 MB), stored 1.2 mm outside to
+/// 5 mm inside".
+std::string implicit_fact(const ImplicitSurface& surface) {
+  const SparseGrid& grid = surface.grid();
+  std::string text = surface.mesh() != nullptr
+                         ? fmt::format("potential of {} triangles", surface.mesh()->mesh().triangles().size())
+                         : std::string("level set");
+  const double mega = 1e-6;
+  text += fmt::format(
+      " on voxels of {} ({}), {} bricks of 8 x 8 x 8 ({:.1f} MB; as a dense grid {:.1f} MB), stored {} "
+      "outside to {} inside",
+      format_length(grid.voxel()),
+      surface.parts().reconstruction == CellReconstruction::smooth ? "smooth" : "trilinear", grid.bricks(),
+      mega * static_cast<double>(grid.memory_bytes()), mega * static_cast<double>(grid.dense_bytes()),
+      format_length(grid.outside()), format_length(-grid.inside()));
+  if (surface.offset() > 0.0) text += fmt::format(", felt {} outside", format_length(surface.offset()));
+  if (surface.textured()) text += ", textured";
+  if (grid.has_materials()) text += ", with local materials";
+  return text;
+}
+
 std::string surface_fact(const Instance& instance) {
+  if (const ImplicitSurface* implicit = implicit_of(instance.surface)) return implicit_fact(*implicit);
   if (const IsoSurface* iso = iso_of(instance.surface)) return volume_fact(*iso);
   const TriangleMesh& mesh = base_mesh(instance.surface);
   const Vec3 extent = mesh.bounds().extent();

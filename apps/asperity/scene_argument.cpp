@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "asperity/core/suggest.h"
+#include "asperity/io/sparse_io.h"
 #include "asperity/io/trace_file.h"
 #include "asperity/io/volume_io.h"
 
@@ -36,7 +37,8 @@ Error unknown_scene(const std::string& scene) {
       scene,
       {},
       fmt::format(
-          "a scene (.json), a mesh (.obj, .ply, .stl), a volume (.vtk, .vti, .vtr, ...), or a built-in scene: {}",
+          "a scene (.json), a mesh (.obj, .ply, .stl, .gltf, .glb), a level set (.vdb), a volume (.vtk, .vti, .vtr, "
+          "...), or a built-in scene: {}",
           fmt::join(names, ", "))};
 }
 
@@ -50,7 +52,9 @@ char first_mark(const std::string& file) {
 bool is_scene_file(const std::string& file) {
   const std::string extension = lower_extension(file);
   if (extension == ".json") return true;
-  return extension != ".obj" && extension != ".ply" && extension != ".stl" && first_mark(file) == '{';
+  static const std::vector<std::string> others{".obj", ".ply", ".stl", ".gltf", ".glb", ".vdb"};
+  if (std::find(others.begin(), others.end(), extension) != others.end()) return false;
+  return first_mark(file) == '{';
 }
 
 bool is_picture_file(const std::string& file) {
@@ -64,8 +68,13 @@ std::string absolute(const std::string& path) {
 
 /// A scene with one surface, of the file.
 SceneText scene_of(const std::string& file, const char* kind) {
-  const Json made = {{"name", fs::path(file).stem().string()},
-                     {"surfaces", Json::array({Json{{kind, absolute(file)}}})}};
+  Json surface = Json::object();
+  if (is_sparse_path(file)) {
+    surface["implicit"] = {{"file", absolute(file)}};
+  } else {
+    surface[kind] = absolute(file);
+  }
+  const Json made = {{"name", fs::path(file).stem().string()}, {"surfaces", Json::array({surface})}};
   return SceneText{made.dump(2, ' ', false, Json::error_handler_t::replace), ".", file};
 }
 
@@ -110,7 +119,39 @@ void change_coat(Json& surface, const SceneArgument& a) {
   }
 }
 
+/// Makes the mesh implicit, as fine as asked for; what is not named stays as the scene has it.
+void change_implicit(Json& surface, const SceneArgument& a) {
+  if (a.implicit.empty() || !surface.is_object()) return;
+  Json& implicit = member(surface, "implicit");
+  // What is felt on triangles has no potential, and the other way round.
+  for (const char* key : {"search", "on_overlap", "shell_directions"}) drop(surface, key);
+  for (const char* key : {"voxel", "resolution", "budget"}) drop(implicit, key);
+  const bool count = a.implicit.find_first_not_of("0123456789") == std::string::npos && a.implicit.size() < 6;
+  if (count) {
+    implicit["resolution"] = std::stoi(a.implicit);
+  } else {
+    implicit["voxel"] = a.implicit;
+  }
+}
+
+/// Drops what another representation needs; law and its options are the caller's.
+void change_kind(Json& surface, const std::string& kind) {
+  if (kind.empty() || !surface.is_object() || !surface.contains("mesh")) return;
+  surface.erase("law");
+  if (kind == "implicit") {
+    for (const char* key : {"search", "on_overlap", "shell_directions"}) surface.erase(key);
+    member(surface, "implicit");
+    return;
+  }
+  surface.erase("implicit");
+  if (kind == "mesh") {
+    for (const char* key : {"coat", "on_overlap", "shell_directions"}) surface.erase(key);
+  }
+}
+
 void change_surface(Json& surface, const SceneArgument& a) {
+  change_kind(surface, a.felt_as);
+  if (a.felt_as.empty() || a.felt_as == "implicit") change_implicit(surface, a);
   put(surface, "units", a.units);
   put(surface, "fit", a.fit);
   put(surface, "up", a.up);
@@ -119,7 +160,7 @@ void change_surface(Json& surface, const SceneArgument& a) {
     put(member(surface, "material"), "stiffness", a.stiffness);
     put(member(surface, "material"), "damping", a.damping);
   }
-  change_coat(surface, a);
+  if (a.felt_as != "mesh") change_coat(surface, a);
 }
 
 void change_device(Json& scene, const SceneArgument& a) {
@@ -149,8 +190,8 @@ void change_stroke(Json& scene, const SceneArgument& a, bool loops) {
 void add_scene_options(CLI::App& command, SceneArgument& a) {
   command
       .add_option("SCENE", a.scene,
-                  "A scene file, a mesh (OBJ, PLY, STL), a volume (VTK, OpenFOAM, NRRD, raw, .aspvol), or a built-in "
-                  "scene (asperity scenes)")
+                  "A scene file, a mesh (OBJ, PLY, STL, glTF), a level set (.vdb), a volume (VTK, OpenFOAM, NRRD, raw, "
+                  ".aspvol), or a built-in scene (asperity scenes)")
       ->capture_default_str();
   command.add_option("--relief", a.relief, "Height map (PNG, JPEG) to lay on every surface")->group("Relief");
   command.add_option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge")->group("Relief");
@@ -166,6 +207,11 @@ void add_scene_options(CLI::App& command, SceneArgument& a) {
   command.add_option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in")->group("Mesh");
   command.add_option("--fit", a.fit, "workspace, none, or the largest side: 80mm")->group("Mesh");
   command.add_option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z")->group("Mesh");
+  command
+      .add_flag("--implicit{256}", a.implicit,
+                "Feel meshes through a potential made from them: so many voxels along the longest side, or a voxel "
+                "(--implicit=128, --implicit=0.4mm)")
+      ->group("Mesh");
   command.add_option("--stiffness", a.stiffness, "Of every surface: 1000, 0.5N/mm")->group("Touch");
   command.add_option("--damping", a.damping, "Of every surface: 0.5 (N s/m)")->group("Touch");
   auto* depth = command.add_option("--depth", a.depth, "Lead the probe at this depth: 1mm")->group("Touch");

@@ -16,7 +16,9 @@ struct SceneArgument {
   std::string scene = "icosphere-relief";
   std::string relief, height, tile, normal_map, channel, white_is, mapping, magnify;
   std::string units, fit, up;
+  std::string implicit;  ///< "256" voxels along the longest side, or a voxel: "0.4mm"
   std::string law, stiffness, damping;
+  std::string felt_as;  ///< "mesh", "relief", "implicit": every surface that has a mesh, whatever the scene says
   std::string depth, force, speed;
   std::string device, hand, rate, probe, probe_radius;
 };

@@ -192,7 +192,7 @@ CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
       ->add_option(
           "--law", options->scene.law,
           "Of every surface: proxy, god-object, force-shading, height-field, mesostructure, generated-geometry, "
-          "dense-mesh; -literal as printed")
+          "dense-mesh; with --implicit proxy, virtual-contact-point, magnetic, avila; -literal as printed")
       ->group("Touch");
   command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE");
   command->add_flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
@@ -204,6 +204,7 @@ CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
       "Examples:\n"
       "  asperity touch                                           the built-in scene\n"
       "  asperity touch bunny.obj --relief rock.png --height 2mm --tile 30mm\n"
+      "  asperity touch bunny.obj --implicit --law virtual-contact-point\n"
       "  asperity touch M_a-H_3 --law height-field-literal --force 1N\n"
       "  asperity touch my.json --probe dynamic --device omega.7 --json --no-report");
   command->callback(

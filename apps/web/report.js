@@ -231,6 +231,7 @@ window.addEventListener("error", (event) => {
       force_mean_n: "Force, mean in contact (N)", force_max_n: "Force, largest (N)", force_rms_n: "Force, RMS in contact (N)",
       force_normal_n: "Normal force, mean (N)", jump_n: "Largest jump in a tick (N)", direction_samples: "Direction samples",
       direction_mean_deg: "Direction error, mean (deg)", direction_p99_deg: "Direction error, p99 (deg)", direction_max_deg: "Direction error, largest (deg)",
+      direction_near_deg: "Direction error near sharp edges, mean (deg)", direction_far_deg: "Direction error elsewhere, mean (deg)",
       height_samples: "Heights compared", height_excluded: "Heights left out, within one texel of a step", height_rms_um: "Height error, RMS (\u00b5m)",
       height_max_um: "Height error, largest (\u00b5m)", relief_um: "Relief met, highest to lowest (\u00b5m)", excursion_um: "Height followed, highest to lowest (\u00b5m)",
       peak_normal_hz: "Normal force, strongest frequency (Hz)", peak_tangential_hz: "Tangential force, strongest frequency (Hz)",
@@ -292,6 +293,8 @@ window.addEventListener("error", (event) => {
       ["largest jump (N)", (n) => number(n.jump_n)], ["energy a loop (mJ)", (n) => number(n.mean_loop_mj, 2)], ["given back (mJ)", (n) => number(n.generated_mj, 2)],
       ["update p50 (\u00b5s)", (n) => number(n.update_p50_us)], ["p99.9", (n) => number(n.update_p999_us)],
     ];
+    const near = data.laws.some((law) => law.numbers.direction_near_deg != null);
+    if (near) columns.splice(3, 0, ["near edges, mean (deg)", (n) => number(n.direction_near_deg, 2)], ["elsewhere (deg)", (n) => number(n.direction_far_deg, 2)]);
     if (data.laws.some((law) => law.follow_time))
       columns.push(["follow error (%)", (n) => number(n.follow_global_percent)], ["at most (%)", (n) => number(n.follow_max_percent)]);
     make(head, "th", "", "law");

@@ -120,6 +120,16 @@ ScalarField::ScalarField(std::unique_ptr<BrickStore> bricks, CellReconstruction 
   finish();
 }
 
+ScalarField::ScalarField(std::shared_ptr<const SparseGrid> sparse, CellReconstruction reconstruction)
+    : sparse_(std::move(sparse)), reconstruction_(reconstruction) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::uint32_t nodes = sparse_->brick_counts()[a] * SparseGrid::brick_cells + 1;
+    // Its voxel is above 0 and there is at least one brick: this cannot fail.
+    sparse_axes_[a] = GridAxis::uniform(sparse_->lower()[static_cast<int>(a)], sparse_->voxel(), nodes).value();
+  }
+  finish();
+}
+
 void ScalarField::finish() {
   identity_ = next_identity();
   const GridAxes& finest = axes();
@@ -153,6 +163,7 @@ void ScalarField::finish() {
 
 std::size_t ScalarField::memory_bytes() const noexcept {
   if (bricks_) return sizeof(*this) + bricks_->resident_bytes();
+  if (sparse_) return sizeof(*this) + sparse_->memory_bytes();
   return sizeof(*this) + grid_->memory_bytes() + octree_.memory_bytes();
 }
 
@@ -189,10 +200,18 @@ bool ScalarField::gather(int level, const CellIndex& cell, CellPolynomial& out) 
   if (reconstruction_ == CellReconstruction::smooth) {
     out.degree = 3;
     if (bricks_) return bricks_->samples(level, cell, out.coefficient);
+    if (sparse_) {
+      sparse_->cell_samples(cell.at, 1, out.coefficient);
+      return true;
+    }
     fetch_samples(cell, out.coefficient);
     return true;
   }
   out.degree = 1;
+  if (sparse_) {
+    sparse_->cell_samples(cell.at, 0, out.coefficient);
+    return true;
+  }
   if (bricks_) {
     double samples[64];
     if (!bricks_->samples(level, cell, samples)) return false;

@@ -7,6 +7,7 @@
 #include "asperity/field/cell_polynomial.h"
 #include "asperity/field/min_max_octree.h"
 #include "asperity/field/scalar_grid.h"
+#include "asperity/field/sparse_grid.h"
 
 namespace asperity {
 
@@ -18,14 +19,17 @@ enum class CellSide : std::uint8_t {
   near,  ///< may pass it
 };
 
-/// A scalar field in space: samples on a rectilinear grid, in memory or in bricks of a file, and what lies between
-/// them. Immutable; queries are const, allocation-free and safe from any thread.
+/// A scalar field in space: samples on a rectilinear grid in memory, in bricks of a file, or near a surface alone, and
+/// what lies between them. Immutable; queries are const, allocation-free and safe from any thread.
 class ScalarField {
  public:
   /// In memory. Builds the octree (in parallel where it is large). [build]
   explicit ScalarField(ScalarGrid grid, CellReconstruction reconstruction = CellReconstruction::smooth);
   /// From bricks. [build]
   explicit ScalarField(std::unique_ptr<BrickStore> bricks,
+                       CellReconstruction reconstruction = CellReconstruction::smooth);
+  /// A signed potential. Beyond its band it is constant. [build]
+  explicit ScalarField(std::shared_ptr<const SparseGrid> sparse,
                        CellReconstruction reconstruction = CellReconstruction::smooth);
 
   [[nodiscard]] CellReconstruction reconstruction() const noexcept { return reconstruction_; }
@@ -34,17 +38,22 @@ class ScalarField {
   /// 1 for a field in memory; level 0 is the finest.
   [[nodiscard]] int levels() const noexcept { return bricks_ ? bricks_->levels() : 1; }
   [[nodiscard]] const GridAxes& axes(int level = 0) const noexcept {
-    return bricks_ ? bricks_->axes(level) : grid_->axes();
+    return bricks_ ? bricks_->axes(level) : sparse_ ? sparse_axes_ : grid_->axes();
   }
   [[nodiscard]] const MinMaxOctree& octree(int level = 0) const noexcept {
-    return bricks_ ? bricks_->octree(level) : octree_;
+    return bricks_ ? bricks_->octree(level) : sparse_ ? sparse_->octree() : octree_;
   }
   [[nodiscard]] Box bounds() const noexcept { return bounds_; }
-  [[nodiscard]] double lowest() const noexcept { return bricks_ ? bricks_->lowest() : grid_->lowest(); }
-  [[nodiscard]] double highest() const noexcept { return bricks_ ? bricks_->highest() : grid_->highest(); }
+  [[nodiscard]] double lowest() const noexcept {
+    return bricks_ ? bricks_->lowest() : sparse_ ? static_cast<double>(sparse_->lowest()) : grid_->lowest();
+  }
+  [[nodiscard]] double highest() const noexcept {
+    return bricks_ ? bricks_->highest() : sparse_ ? static_cast<double>(sparse_->highest()) : grid_->highest();
+  }
   /// Width of the narrowest cell (m). [any]
   [[nodiscard]] double narrowest_cell() const noexcept { return narrowest_; }
   [[nodiscard]] const ScalarGrid* grid() const noexcept { return grid_ ? &*grid_ : nullptr; }
+  [[nodiscard]] const SparseGrid* sparse() const noexcept { return sparse_.get(); }
   [[nodiscard]] const BrickStore* bricks() const noexcept { return bricks_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
@@ -91,6 +100,8 @@ class ScalarField {
 
   std::optional<ScalarGrid> grid_;
   std::unique_ptr<BrickStore> bricks_;
+  std::shared_ptr<const SparseGrid> sparse_;
+  GridAxes sparse_axes_;
   MinMaxOctree octree_;
   Box bounds_;
   CellReconstruction reconstruction_;

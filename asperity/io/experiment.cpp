@@ -34,8 +34,8 @@ Result<std::string> read_text(const std::filesystem::path& file) {
 Box base_bounds(std::span<const Instance> instances) {
   Box bounds;
   for (const Instance& instance : instances) {
-    const IsoSurface* iso = iso_of(instance.surface);
-    const Box local = iso != nullptr ? iso->surface_bounds() : base_mesh(instance.surface).bounds();
+    const MeshSurface* base = base_of(instance.surface);
+    const Box local = base != nullptr ? base->bounds() : iso_of(instance.surface)->surface_bounds();
     for (unsigned corner = 0; corner < 8; ++corner) {
       bounds.include(instance.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
                                                            (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
@@ -49,7 +49,8 @@ Box base_bounds(std::span<const Instance> instances) {
 /// bricks is asked on its coarsest level, the one that is always in memory.
 SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, double& distance) {
   SurfacePoint nearest{p, Vec3::Zero()};
-  if (const IsoSurface* iso = iso_of(surface)) {
+  if (base_of(surface) == nullptr) {
+    const IsoSurface* iso = iso_of(surface);
     const IsoView view = iso->view(iso->field().levels() - 1);
     iso->field().enter();
     const Foot foot = view.closest(p, infinity, hint.iso);
@@ -82,6 +83,14 @@ SurfaceProjector projector(const Scene& scene) {
     }
     return best;
   };
+}
+
+/// The probe's radius ahead of the probe, whose defaults depend on the surfaces; what is wrong with it is said then.
+double probe_radius_of(const SceneJson* probe) {
+  if (probe == nullptr || !probe->is_object() || !probe->contains("radius")) return 0.0;
+  const SceneJson only = SceneJson{{"radius", (*probe)["radius"]}};
+  ObjectReader reader(only, "probe", "probe");
+  return reader.quantity("radius", Dimension::length, 0.0, Range::not_negative());
 }
 
 /// A scene with effects needs no surfaces.
@@ -148,7 +157,7 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   ASPERITY_CHECK(root.status());
   ASPERITY_TRY(ScenePart<DeviceProfile> device, read_device(root.raw("device"), "device"));
   ASPERITY_TRY(ScenePart<HandImpedance> hand, read_hand(root.raw("hand"), "hand"));
-  SceneContext context{folder, device.value, progress, {}, {}};
+  SceneContext context{folder, device.value, progress, {}, {}, probe_radius_of(root.raw("probe"))};
   SceneJson surfaces;
   SceneJson effects_json;
   ASPERITY_TRY(std::vector<FieldEffect> effects, read_effects(root, context, effects_json));

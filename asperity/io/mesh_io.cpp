@@ -14,7 +14,7 @@ namespace asperity {
 namespace {
 
 constexpr std::uintmax_t largest_file = std::uintmax_t{4} << 30U;
-constexpr const char* accepted_formats = "an OBJ, PLY or STL file";
+constexpr const char* accepted_formats = "an OBJ, PLY, STL or glTF file";
 
 std::string lower_extension(const std::string& name) {
   std::string extension = std::filesystem::path(name).extension().string();
@@ -31,12 +31,15 @@ bool has_obj_vertex(std::string_view bytes) {
   return false;
 }
 
-Result<MeshSource> read_by_format(std::string_view bytes, const std::string& name) {
+Result<MeshSource> read_by_format(std::string_view bytes, const std::string& name,
+                                  const std::filesystem::path* folder) {
   if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, accepted_formats};
   const std::string extension = lower_extension(name);
+  if (bytes.starts_with("glTF")) return mesh_readers::read_gltf(bytes, folder);
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || extension == ".ply") {
     return mesh_readers::read_ply(bytes);
   }
+  if (extension == ".gltf" || extension == ".glb") return mesh_readers::read_gltf(bytes, folder);
   if (extension == ".stl" || mesh_readers::is_exact_binary_stl(bytes)) return mesh_readers::read_stl(bytes);
   if (extension == ".obj") return mesh_readers::read_obj(bytes);
   if (bytes.starts_with("solid")) return mesh_readers::read_stl(bytes);
@@ -64,6 +67,17 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uintmax_t>(stream.gcount()) != size) return missing(path, "cannot be read to its end");
   return bytes;
+}
+
+/// `folder`: where other files that the mesh file names are looked for; null: nowhere.
+Result<MeshSource> read_named(std::string_view bytes, const std::string& name, const std::filesystem::path* folder) {
+  try {
+    Result<MeshSource> source = read_by_format(bytes, name, folder);
+    if (source) return source;
+    return std::move(source).error().in_file(name);
+  } catch (const std::exception& problem) {
+    return Error{ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name, {}, {}};
+  }
 }
 
 template <class Number>
@@ -121,19 +135,14 @@ std::string_view take_word(std::string_view& line) {
 }  // namespace mesh_readers
 
 Result<MeshSource> read_mesh_bytes(std::string_view bytes, const std::string& name) {
-  try {
-    Result<MeshSource> source = read_by_format(bytes, name);
-    if (source) return source;
-    return std::move(source).error().in_file(name);
-  } catch (const std::exception& problem) {
-    return Error{ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name, {}, {}};
-  }
+  return read_named(bytes, name, nullptr);
 }
 
 Result<MeshSource> read_mesh(const std::filesystem::path& path) {
   try {
     ASPERITY_TRY(const std::string bytes, read_file(path));
-    return read_mesh_bytes(bytes, path.string());
+    const std::filesystem::path folder = path.parent_path();
+    return read_named(bytes, path.string(), &folder);
   } catch (const std::exception& problem) {
     return missing(path, fmt::format("cannot be read ({})", problem.what()));
   }

@@ -10,19 +10,26 @@
 
 namespace asperity {
 
-/// Reads a triangle mesh from an OBJ, PLY (ascii, binary of either byte order) or STL (ascii, binary) file. The content
-/// decides where it is unmistakable, else the extension. Positions stay in the file's unit, which no format states:
-/// MeshBuildSettings::scale applies it later. Polygons (3 to 1,024 corners) become triangles: in OBJ files by
-/// tinyobjloader's ear clipping, in PLY files as a fan around their first corner. Texture coordinates are kept if every
-/// face has them.
+/// Reads a triangle mesh from an OBJ, PLY (ascii, binary of either byte order), STL (ascii, binary) or glTF 2.0 (.gltf,
+/// .glb) file. The content decides where it is unmistakable, else the extension. Positions stay in the file's unit,
+/// which only glTF states (metres, y up): MeshBuildSettings::scale applies it later. Polygons (3 to 1,024 corners)
+/// become triangles: in OBJ files by tinyobjloader's ear clipping, in PLY files as a fan around their first corner.
+/// Texture coordinates are kept if every face has them, v upwards from a map's lower edge.
+///
+/// Of glTF files the triangles, strips and fans of the default scene are read, each mesh as often as nodes place it,
+/// mirrored ones turned round. Buffers may be in the file, in data URIs or in files named by a relative path. Images
+/// and materials are not looked at; skins, morph targets and animations are left out with a note. Compressed and
+/// quantised geometry is refused.
 ///
 /// What is read but left out (normals, colours, groups) needs no word; what may surprise stands in MeshSource::notes.
 /// Errors, each naming file and place: file_missing (or a folder), file_empty, file_truncated, file_malformed,
-/// file_unsupported, bad_mesh (no faces, index out of range, coordinate not finite), too_large (over 4 GiB).
-/// Memory stays within a small multiple of the file's size, whatever its header promises. [build]
+/// file_unsupported, bad_mesh (no faces, index out of range, coordinate not finite), too_large (over 4 GiB; a glTF
+/// scene of over 67 million triangles). Memory stays within a small multiple of the files' size, whatever their headers
+/// promise, and that of the triangles that instances ask for. [build]
 Result<MeshSource> read_mesh(const std::filesystem::path& path);
 
-/// The same from memory. `name` stands in errors, and its extension takes the part of the file's. [build]
+/// The same from memory. `name` stands in errors, and its extension takes the part of the file's. A glTF that names
+/// other files is refused (file_unsupported). [build]
 Result<MeshSource> read_mesh_bytes(std::string_view bytes, const std::string& name);
 
 /// A mesh to be written, owned by somebody else.

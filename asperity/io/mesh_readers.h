@@ -2,6 +2,7 @@
 // Private to asperity/io: the readers behind read_mesh(), and the text handling that they share.
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,9 @@ inline constexpr std::size_t most_corners = 1024;
 Result<MeshSource> read_obj(std::string_view bytes);
 Result<MeshSource> read_ply(std::string_view bytes);
 Result<MeshSource> read_stl(std::string_view bytes);
+/// glTF 2.0, text or binary: the triangles of the default scene in their nodes' places, in metres. `folder` is where
+/// the buffers that it names lie; null: such a file is refused. [build]
+Result<MeshSource> read_gltf(std::string_view bytes, const std::filesystem::path* folder);
 /// Whether the bytes are a binary STL of exactly the size that its triangle count asks for.
 bool is_exact_binary_stl(std::string_view bytes);
 

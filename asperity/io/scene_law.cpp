@@ -79,10 +79,16 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
   return reader.status();
 }
 
+const std::vector<std::string>& magnitude_names() {
+  static const std::vector<std::string> names{"distance", "potential"};
+  return names;
+}
+
 /// Refuses every option but those in `own`.
 void only(ObjectReader& reader, std::initializer_list<std::string_view> own, const std::string& who) {
-  for (const std::string_view key : {"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius",
-                                     "band", "largest_force", "retarding", "reach"}) {
+  for (const std::string_view key :
+       {"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius", "band", "largest_force",
+        "retarding", "reach", "magnitude", "depth_gain", "offset"}) {
     if (std::find(own.begin(), own.end(), key) == own.end()) reader.refuse({key}, who);
   }
 }
@@ -107,6 +113,17 @@ void read_generated(ObjectReader& reader, GeneratedGeometryLaw& law) {
 void read_dense(ObjectReader& reader, DenseMeshLaw& law) {
   only(reader, {"subdivisions"}, "by the law \"dense-mesh\"");
   if (reader.has("subdivisions")) law.subdivisions = reader.integer("subdivisions", 1, 1, most_generated_subdivisions);
+}
+
+void read_virtual_contact_point(ObjectReader& reader, VirtualContactPointLaw& law) {
+  only(reader, {"formulation", "magnitude", "depth_gain", "offset"}, "by the law \"virtual-contact-point\"");
+  if (law.formulation == Formulation::consistent) {
+    reader.refuse({"magnitude"}, "by the consistent law \"virtual-contact-point\", which has one magnitude");
+  } else {
+    law.magnitude = static_cast<ContactMagnitude>(reader.choice("magnitude", magnitude_names(), 0));
+  }
+  law.depth_gain = reader.number("depth_gain", law.depth_gain, Range::not_negative());
+  law.offset = reader.quantity("offset", Dimension::length, law.offset, Range::not_negative());
 }
 
 SceneJson blend_json(Blend blend, const std::vector<double>& weights) {
@@ -142,6 +159,17 @@ SceneJson law_json(const Law& law) {
     json["formulation"] = formulation_names()[static_cast<std::size_t>(cross->formulation)];
     json["retarding"] = cross->retarding;
     if (cross->formulation == Formulation::literal) json["reach"] = cross->reach;
+  } else if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) {
+    json["type"] = "virtual-contact-point";
+    json["formulation"] = formulation_names()[static_cast<std::size_t>(contact->formulation)];
+    if (contact->formulation == Formulation::literal)
+      json["magnitude"] = magnitude_names()[static_cast<std::size_t>(contact->magnitude)];
+    json["depth_gain"] = contact->depth_gain;
+    json["offset"] = contact->offset;
+  } else if (const auto* magnetic = std::get_if<MagneticLaw>(&law)) {
+    json["type"] = "magnetic";
+    json["formulation"] = formulation_names()[static_cast<std::size_t>(magnetic->formulation)];
+    json["band"] = magnetic->band;
   } else {
     json["type"] = law_name(law);
     if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
@@ -192,6 +220,13 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     avila->band = reader.number("band", avila->band, Range::not_negative());
     avila->largest_force = reader.quantity("largest_force", Dimension::force, avila->largest_force, Range::positive());
     avila->retarding = reader.quantity("retarding", Dimension::damping, avila->retarding, Range::not_negative());
+  } else if (auto* contact = std::get_if<VirtualContactPointLaw>(&*law)) {
+    contact->formulation = formulation(contact->formulation);
+    read_virtual_contact_point(reader, *contact);
+  } else if (auto* magnetic = std::get_if<MagneticLaw>(&*law)) {
+    only(reader, {"formulation", "band"}, "by the law \"magnetic\"");
+    magnetic->formulation = formulation(magnetic->formulation);
+    magnetic->band = reader.quantity("band", Dimension::length, magnetic->band, Range::positive());
   } else if (auto* cross = std::get_if<CrossUncrossLaw>(&*law)) {
     only(reader, {"formulation", "retarding", "reach"}, "by the law \"cross-uncross\"");
     cross->formulation = formulation(cross->formulation);

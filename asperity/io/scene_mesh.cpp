@@ -282,12 +282,20 @@ Box used_bounds(const MeshSource& source) {
   return bounds;
 }
 
-void note_fit(const MeshPart& part, const Vec3& extent, double scale, const SceneContext& context, std::string& note) {
+/// glTF defines its unit; the other formats leave it open.
+const char* unit_of_file(const SceneJson& mesh) {
+  const std::string extension = std::filesystem::path(mesh.get<std::string>()).extension().string();
+  const bool metric = extension == ".gltf" || extension == ".glb" || extension == ".GLTF" || extension == ".GLB";
+  return metric ? "its file is in metres" : "its file states no unit";
+}
+
+void note_fit(const MeshPart& part, const char* unit, const Vec3& extent, double scale, const SceneContext& context,
+              std::string& note) {
   note = fmt::format(
-      "mesh \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
+      "mesh \"{}\": {}; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
       "radius of {} "
       "(\"units\" or \"fit\" choose otherwise)",
-      part.name, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
+      part.name, unit, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
       format_length(scale * extent.z()), context.device.name);
 }
 
@@ -328,11 +336,11 @@ double read_fit(ObjectReader& surface, bool by_default, const SceneContext& cont
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   const SceneJson* mesh = surface.raw("mesh");
   if (mesh == nullptr) {
-    surface.fail("mesh", "is missing", "a mesh file (OBJ, PLY, STL) or an object with a generator");
+    surface.fail("mesh", "is missing", "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator");
     return *surface.error();
   }
   if (!mesh->is_string() && !mesh->is_object()) {
-    surface.fail_type("mesh", *mesh, "a mesh file (OBJ, PLY, STL) or an object with a generator");
+    surface.fail_type("mesh", *mesh, "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator");
     return *surface.error();
   }
   ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface, context)
@@ -351,10 +359,13 @@ Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   const bool fitted = size > 0.0 && largest > 0.0;
   const double scale = fitted ? size / largest : 1.0;
   const Vec3 centre = fitted ? bounds.centre() : Vec3(Vec3::Zero());
-  for (Vec3& p : part.source.positions) p = turned_up((p - centre) * (unit * scale), up);
+  part.scale = unit * scale;
+  part.centre = centre;
+  part.turned = up != 1;
+  for (Vec3& p : part.source.positions) p = turned_up((p - centre) * part.scale, up);
   if (fitted && part.from_file && !stated) {
     std::string note;
-    note_fit(part, unit * bounds.extent(), scale, context, note);
+    note_fit(part, unit_of_file(*mesh), unit * bounds.extent(), scale, context, note);
     context.note(std::move(note));
   }
   for (const std::string& note : part.source.notes) context.note(fmt::format("mesh \"{}\": {}", part.name, note));

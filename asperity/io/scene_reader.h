@@ -37,6 +37,7 @@ struct SceneContext {
   Progress progress;
   std::vector<std::string> notes;
   std::vector<SharedVolume> volumes;  ///< read so far: entries that say the same share one
+  double probe_radius = 0.0;          ///< m
 
   void note(std::string text) { notes.push_back(std::move(text)); }
   /// `name` as an absolute path, relative ones from `folder`.
@@ -81,9 +82,16 @@ struct MeshPart {
   MeshSource source;  ///< m
   std::string name;   ///< what the surface is called unless the scene says otherwise
   bool from_file = false;
+  // Where the source's own positions went: turned up, scale (p - centre).
+  double scale = 1.0;
+  Vec3 centre = Vec3::Zero();
+  bool turned = false;
 };
 /// Reads `mesh`, `units`, `fit` and `up` of a surface. Sets an error in `surface` or answers one. [build]
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context);
+
+/// Welds, cleans and validates it, with its notes; its errors name the file. [build]
+Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context);
 
 /// The `units` of a file, in metres; refused for what is generated. [build]
 double read_units(ObjectReader& object, bool from_file);
@@ -99,6 +107,18 @@ Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const 
                                                    SceneContext& context);
 /// Reads the scene's `effects`, none where there are none; their canonical copies go into `canonical`. [build]
 Result<std::vector<FieldEffect>> read_effects(ObjectReader& root, SceneContext& context, SceneJson& canonical);
+
+/// A size in bytes, or as text ("64 MB"). [build]
+std::size_t read_bytes(ObjectReader& reader, std::string_view key, std::size_t fallback);
+
+/// How an implicit surface will be felt: what its bands have to reach for.
+struct ImplicitFeel {
+  Law law = ProxyLaw{};
+  Material material;
+  double probe_radius = 0.0;  ///< m
+};
+/// Reads `implicit` of a surface, its mesh and coat where it has them. [build]
+Status read_implicit(ObjectReader& surface, const ImplicitFeel& feel, SceneContext& context, Instance& instance);
 
 /// A coat for `mesh`. [build]
 Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,

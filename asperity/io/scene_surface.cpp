@@ -51,19 +51,6 @@ Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& c
   return sides;
 }
 
-Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context) {
-  const SceneJson* key = surface.raw("mesh");
-  Result<TriangleMesh> mesh = TriangleMesh::build(std::move(part.source));
-  if (!mesh) {
-    Error error = std::move(mesh).error();
-    if (part.from_file) error = std::move(error).in_file(context.resolve(key->get<std::string>()).string());
-    if (error.place.empty()) error.place = surface.place_of("mesh");
-    return error;
-  }
-  for (const std::string& note : mesh->notes()) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
-  return mesh;
-}
-
 /// The relief, with a note on what building it had to change.
 Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface, SceneContext& context,
                              const std::string& name) {
@@ -122,6 +109,19 @@ Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& in
 
 }  // namespace
 
+Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context) {
+  const SceneJson* key = surface.raw("mesh");
+  Result<TriangleMesh> mesh = TriangleMesh::build(std::move(part.source));
+  if (!mesh) {
+    Error error = std::move(mesh).error();
+    if (part.from_file) error = std::move(error).in_file(context.resolve(key->get<std::string>()).string());
+    if (error.place.empty()) error.place = surface.place_of("mesh");
+    return error;
+  }
+  for (const std::string& note : mesh->notes()) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
+  return mesh;
+}
+
 Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
   static const SceneJson empty = SceneJson::object();
   ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("pose"), "pose");
@@ -159,8 +159,10 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   ObjectReader reader(json, place, "surface");
   ASPERITY_CHECK(reader.status());
   Instance instance;
-  ASPERITY_CHECK(reader.has("volume") ? read_isosurface(reader, context, instance)
-                                      : read_triangles(reader, context, instance));
+  if (!reader.has("implicit")) {
+    ASPERITY_CHECK(reader.has("volume") ? read_isosurface(reader, context, instance)
+                                        : read_triangles(reader, context, instance));
+  }
   ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
   ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
   reader.write("law", law_json(instance.law));
@@ -168,6 +170,11 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
     ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));
     instance.law = std::move(read.value);
     reader.write("law", std::move(read.canonical));
+  }
+  if (reader.has("implicit")) {
+    // Last: how far its potential is stored depends on how it is felt.
+    const ImplicitFeel feel{instance.law, instance.material, context.probe_radius};
+    ASPERITY_CHECK(read_implicit(reader, feel, context, instance));
   }
   ASPERITY_CHECK(reader.status());
   return ScenePart<Instance>{std::move(instance), std::move(reader.canonical())};

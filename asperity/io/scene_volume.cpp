@@ -63,42 +63,6 @@ VolumeWords read_words(ObjectReader& reader) {
   return words;
 }
 
-/// "512 MB", or bytes.
-std::size_t read_residency(ObjectReader& reader) {
-  constexpr double least = 1048576.0;
-  constexpr double most = 1099511627776.0;
-  const char* accepted = "bytes, or a text with kB, MB, GB, KiB, MiB or GiB; 1 MiB to 1 TiB";
-  const std::size_t fallback = BrickSettings{}.resident_bytes;
-  const SceneJson* value = reader.raw("residency");
-  double bytes = static_cast<double>(fallback);
-  if (value != nullptr && value->is_number()) {
-    bytes = value->get<double>();
-  } else if (value != nullptr && value->is_string()) {
-    const auto& text = value->get_ref<const std::string&>();
-    const std::size_t end = text.find_first_not_of("0123456789. ");
-    Result<double> number = parse_quantity(text.substr(0, end), Dimension::ratio);
-    const std::string unit = end == std::string::npos ? "" : text.substr(end);
-    static const std::vector<std::pair<std::string, double>> units{
-        {"B", 1.0}, {"kB", 1e3}, {"MB", 1e6}, {"GB", 1e9}, {"KiB", 1024.0}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}};
-    const auto found = std::find_if(units.begin(), units.end(), [&](const auto& entry) { return entry.first == unit; });
-    if (!number || found == units.end()) {
-      reader.fail("residency", fmt::format("\"{}\" is no size", text), accepted);
-      return fallback;
-    }
-    bytes = *number * found->second;
-  } else if (value != nullptr) {
-    reader.fail_type("residency", *value, accepted);
-    return fallback;
-  }
-  if (!(bytes >= least && bytes <= most)) {
-    reader.fail("residency", fmt::format("is {:g} bytes", bytes), accepted);
-    return fallback;
-  }
-  const auto resident = static_cast<std::size_t>(bytes);
-  reader.write("residency", resident);
-  return resident;
-}
-
 std::array<std::uint32_t, 3> three_counts(ObjectReader& reader, std::string_view key, std::uint32_t least) {
   std::array<std::uint32_t, 3> counts{};
   const SceneJson* value = reader.raw(key);
@@ -262,7 +226,7 @@ Result<VolumePart> open_bricks(ObjectReader& object, ObjectReader& reader, const
                 "from a bricked file, which holds one scalar: asperity convert chooses it");
   object.refuse({"units", "fit"}, "for a bricked file, whose axes are in metres: asperity convert scales them");
   BrickSettings settings;
-  settings.resident_bytes = read_residency(reader);
+  settings.resident_bytes = read_bytes(reader, "residency", BrickSettings{}.resident_bytes);
   ASPERITY_CHECK(reader.status());
   ASPERITY_CHECK(object.status());
   Result<std::unique_ptr<BrickStore>> store = BrickStore::open(path, settings);
@@ -353,6 +317,40 @@ double chosen_threshold(const VolumePart& volume, SceneContext& context) {
 }
 
 }  // namespace
+
+std::size_t read_bytes(ObjectReader& reader, std::string_view key, std::size_t fallback) {
+  constexpr double least = 1048576.0;
+  constexpr double most = 1099511627776.0;
+  const char* accepted = "bytes, or a text with kB, MB, GB, KiB, MiB or GiB; 1 MiB to 1 TiB";
+  const SceneJson* value = reader.raw(key);
+  double bytes = static_cast<double>(fallback);
+  if (value != nullptr && value->is_number()) {
+    bytes = value->get<double>();
+  } else if (value != nullptr && value->is_string()) {
+    const auto& text = value->get_ref<const std::string&>();
+    const std::size_t end = text.find_first_not_of("0123456789. ");
+    Result<double> number = parse_quantity(text.substr(0, end), Dimension::ratio);
+    const std::string unit = end == std::string::npos ? "" : text.substr(end);
+    static const std::vector<std::pair<std::string, double>> units{
+        {"B", 1.0}, {"kB", 1e3}, {"MB", 1e6}, {"GB", 1e9}, {"KiB", 1024.0}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}};
+    const auto found = std::find_if(units.begin(), units.end(), [&](const auto& entry) { return entry.first == unit; });
+    if (!number || found == units.end()) {
+      reader.fail(key, fmt::format("\"{}\" is no size", text), accepted);
+      return fallback;
+    }
+    bytes = *number * found->second;
+  } else if (value != nullptr) {
+    reader.fail_type(key, *value, accepted);
+    return fallback;
+  }
+  if (!(bytes >= least && bytes <= most)) {
+    reader.fail(key, fmt::format("is {:g} bytes", bytes), accepted);
+    return fallback;
+  }
+  const auto resident = static_cast<std::size_t>(bytes);
+  reader.write(key, resident);
+  return resident;
+}
 
 Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context) {
   const SceneJson* volume = object.raw("volume");

@@ -71,8 +71,8 @@ double MeshConstraints::sweep(const Segment& motion) noexcept {
   return first;
 }
 
-LawForce owner_force(const Instance& instance, std::size_t owner, const ConstraintSolution& solution, const Vec3& goal,
-                     const ProbeSample& probe) noexcept {
+LawForce owner_force(const Instance& instance, const Material& material, std::size_t owner,
+                     const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
   LawForce answer;
   Vec3 spring = Vec3::Zero();
   double strongest = 0.0;
@@ -88,7 +88,6 @@ LawForce owner_force(const Instance& instance, std::size_t owner, const Constrai
   }
   if (plane == nullptr) return answer;
   const Pose& pose = instance.world_from_object;
-  const Material& material = instance.material;
   answer.contact = true;
   answer.penetration = spring.norm();
   answer.normal = spring / answer.penetration;

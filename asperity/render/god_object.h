@@ -14,8 +14,8 @@ Vec3 shading_normal(const Instance& instance, const Foot& contact) noexcept;
 /// Force of one owner among solved planes, world frame: its share of the spring from `goal`, and, for the owner that
 /// pushes most, what friction holds (from the goal on to the probe); shaded and damped as its law and material say.
 /// [servo]
-LawForce owner_force(const Instance& instance, std::size_t owner, const ConstraintSolution& solution, const Vec3& goal,
-                     const ProbeSample& probe) noexcept;
+LawForce owner_force(const Instance& instance, const Material& material, std::size_t owner,
+                     const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept;
 
 /// The instances that constrain the proxy this tick, in the world frame. [servo]
 class MeshConstraints {

@@ -58,6 +58,7 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
               penetration,
               height,
               face,
+              false,
               Vec3::Zero()};
   });
   return answer;

@@ -132,10 +132,29 @@ bool take_up(const IsoView& surface, double side, const Vec3& near, ContactState
 
 }  // namespace
 
-bool update_felt(const IsoSurface& surface, Sides sides, int level, Seconds dt, const Vec3& free,
+double ball_level(const Instance& instance, const Scene& scene) noexcept {
+  const ImplicitSurface* implicit = implicit_of(instance.surface);
+  const double radius = scene.probe_radius();
+  if (implicit == nullptr || implicit->textured() || radius == 0.0) return 0.0;
+  if (!std::holds_alternative<ProxyLaw>(instance.law) || scene.instances().size() != 1) return 0.0;
+  // Level sets of the potential turn their front to the outside only.
+  if (instance.sides != Sides::front || implicit->offset() + radius > implicit->reach_outside()) return 0.0;
+  return radius;
+}
+
+std::uint32_t element_at(const Instance& instance, const Vec3& place, ContactState& slot) noexcept {
+  const ImplicitSurface* implicit = implicit_of(instance.surface);
+  if (implicit != nullptr && implicit->grid().has_faces()) {
+    const std::uint32_t face = implicit->grid().face(place, slot.hint.sparse);
+    if (face != no_index) return face;
+  }
+  return iso_of(instance.surface)->element_of(slot.iso.level, place);
+}
+
+bool update_felt(const IsoSurface& surface, double further, Sides sides, int level, Seconds dt, const Vec3& free,
                  ContactState& slot) noexcept {
   IsoContact& felt = slot.iso;
-  const double target = surface.threshold();
+  const double target = surface.threshold() + further;
   if (felt.field != surface.field().identity()) {
     felt = {};
     felt.field = surface.field().identity();

@@ -16,6 +16,7 @@ struct LawForce {
   double penetration = 0.0;    ///< m
   double height = 0.0;         ///< relief height under the probe (m)
   std::uint32_t element = no_index;
+  bool damped = false;       ///< damping is part of the force already
   Vec3 turn = Vec3::Zero();  ///< N, lateral force of consistent shading, to be added as far as its budget lets it
 };
 
@@ -42,6 +43,22 @@ LawForce avila_force(const AvilaLaw& law, const IsoSurface& surface, const IsoVi
 LawForce cross_uncross_force(const CrossUncrossLaw& law, const IsoSurface& surface, const IsoView& view,
                              const Material& material, const Vec3& probe, const Vec3& velocity,
                              ContactState& state) noexcept;
+
+/// hybrid-surface-2004, eq. 1 and 2; Fig. 6a. `probe` and `velocity` in the object frame, `material` the surface's own:
+/// local ones are looked up. Felt from the front alone (literal: whoever starts inside is pushed at once; consistent:
+/// after having been outside). Keeps state.iso's point (p_c), normal, value and started, state.touching's counterpart
+/// state.iso.crossed, and state.seen_outside. Sets `damped`. [servo]
+LawForce virtual_contact_force(const VirtualContactPointLaw& law, const ImplicitSurface& surface,
+                               const Material& material, const Vec3& probe, const Vec3& velocity, Seconds dt,
+                               ContactState& state) noexcept;
+/// hybrid-surface-2004, Fig. 6b. As above. [servo]
+LawForce magnetic_force(const MagneticLaw& law, const ImplicitSurface& surface, const Material& material,
+                        const Vec3& probe, const Vec3& velocity, Seconds dt, ContactState& state) noexcept;
+/// hybrid-surface-2004, Fig. 10a: the previous method. [servo]
+LawForce normal_perturbation_force(const ImplicitSurface& surface, const Material& material, const Vec3& probe,
+                                   ContactState& state) noexcept;
+/// What the surface is made of at p (object frame): stored there, or the instance's own. [servo]
+Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept;
 
 /// The shell around a probe, as the consistent forms of Algorithms 1 and 2 need it.
 struct ShellContact {

@@ -45,22 +45,41 @@ Status validate_cross_uncross(const CrossUncrossLaw& law) {
   return success();
 }
 
+Status validate_virtual_contact_point(const VirtualContactPointLaw& law) {
+  if (!(law.depth_gain >= 0.0 && std::isfinite(law.depth_gain)))
+    return option_error("depth_gain", law.depth_gain, "0 or more (1/m)");
+  if (!(law.offset >= 0.0 && std::isfinite(law.offset)))
+    return option_error("offset", law.offset, "a length of 0 or more (m, mm)");
+  if (law.magnitude != ContactMagnitude::distance && law.formulation == Formulation::consistent) {
+    return Error{ErrorCode::bad_value,
+                 "is the literal form's: the consistent one is the slope of one energy",
+                 {},
+                 "magnitude",
+                 "\"distance\", or formulation \"literal\""};
+  }
+  return success();
+}
+
 }  // namespace
 
 std::string law_name(const Law& law) {
   const auto suffix = [](Formulation f) { return f == Formulation::literal ? std::string("-literal") : std::string(); };
-  return std::visit(Overloaded{
-                        [](const ProxyLaw&) { return std::string("proxy"); },
-                        [](const GodObjectLaw&) { return std::string("god-object"); },
-                        [&](const ForceShadingLaw& l) { return "force-shading" + suffix(l.formulation); },
-                        [&](const HeightFieldLaw& l) { return "height-field" + suffix(l.formulation); },
-                        [&](const MesostructureLaw& l) { return "mesostructure" + suffix(l.formulation); },
-                        [](const GeneratedGeometryLaw&) { return std::string("generated-geometry"); },
-                        [](const DenseMeshLaw&) { return std::string("dense-mesh"); },
-                        [&](const AvilaLaw& l) { return "avila" + suffix(l.formulation); },
-                        [&](const CrossUncrossLaw& l) { return "cross-uncross" + suffix(l.formulation); },
-                    },
-                    law);
+  return std::visit(
+      Overloaded{
+          [](const ProxyLaw&) { return std::string("proxy"); },
+          [](const GodObjectLaw&) { return std::string("god-object"); },
+          [&](const ForceShadingLaw& l) { return "force-shading" + suffix(l.formulation); },
+          [&](const HeightFieldLaw& l) { return "height-field" + suffix(l.formulation); },
+          [&](const MesostructureLaw& l) { return "mesostructure" + suffix(l.formulation); },
+          [](const GeneratedGeometryLaw&) { return std::string("generated-geometry"); },
+          [](const DenseMeshLaw&) { return std::string("dense-mesh"); },
+          [&](const AvilaLaw& l) { return "avila" + suffix(l.formulation); },
+          [&](const CrossUncrossLaw& l) { return "cross-uncross" + suffix(l.formulation); },
+          [&](const VirtualContactPointLaw& l) { return "virtual-contact-point" + suffix(l.formulation); },
+          [&](const MagneticLaw& l) { return "magnetic" + suffix(l.formulation); },
+          [](const NormalPerturbationLaw&) { return std::string("normal-perturbation"); },
+      },
+      law);
 }
 
 const std::vector<std::string>& law_names() {
@@ -77,7 +96,12 @@ const std::vector<std::string>& law_names() {
                                               "avila",
                                               "avila-literal",
                                               "cross-uncross",
-                                              "cross-uncross-literal"};
+                                              "cross-uncross-literal",
+                                              "virtual-contact-point",
+                                              "virtual-contact-point-literal",
+                                              "magnetic",
+                                              "magnetic-literal",
+                                              "normal-perturbation"};
   return names;
 }
 
@@ -98,6 +122,11 @@ Result<Law> law_by_name(std::string_view name) {
   if (name == "avila-literal") return Law(AvilaLaw{Formulation::literal});
   if (name == "cross-uncross") return Law(CrossUncrossLaw{});
   if (name == "cross-uncross-literal") return Law(CrossUncrossLaw{Formulation::literal});
+  if (name == "virtual-contact-point") return Law(VirtualContactPointLaw{});
+  if (name == "virtual-contact-point-literal") return Law(VirtualContactPointLaw{Formulation::literal});
+  if (name == "magnetic") return Law(MagneticLaw{});
+  if (name == "magnetic-literal") return Law(MagneticLaw{Formulation::literal});
+  if (name == "normal-perturbation") return Law(NormalPerturbationLaw{});
   std::string list;
   for (const std::string& known : law_names()) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, law_names());
@@ -111,6 +140,10 @@ Result<Law> law_by_name(std::string_view name) {
 Status validate(const Law& law) {
   if (const auto* avila = std::get_if<AvilaLaw>(&law)) return validate_avila(*avila);
   if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) return validate_cross_uncross(*cross);
+  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) return validate_virtual_contact_point(*contact);
+  if (const auto* magnetic = std::get_if<MagneticLaw>(&law);
+      magnetic != nullptr && !(magnetic->band > 0.0 && std::isfinite(magnetic->band)))
+    return option_error("band", magnetic->band, "a length above 0 (m, mm)");
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     const double taper = height_field->edge_taper;
     if (!(taper >= 0.0 && taper <= 1.0 / 3.0)) return option_error("edge_taper", taper, "0 to 1/3");

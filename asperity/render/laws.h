@@ -104,11 +104,52 @@ struct CrossUncrossLaw {
   double reach = 0.0;      ///< literal: alpha |N| of eq. 15, how far T lies from the probe (m); 0: 64 cells
 };
 
-using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw,
-                         GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw>;
+/// How far the virtual contact point is taken to be.
+enum class ContactMagnitude {
+  distance,   ///< to the virtual contact point (hybrid-surface-2004)
+  potential,  ///< what the potential says (Avila and Sobierajski 1996): softer where edges are interpolated
+};
+
+/// Virtual contact point of an implicit surface: the probe is held by a spring and a damper to the surface's point
+/// along the potential's gradient (hybrid-surface-2004, eq. 1), which friction retards (eq. 2; f_c is the material's
+/// dynamic friction). Felt from the front alone; it has no memory of the side, so a sheet thinner than twice the
+/// penetration lets the probe through: `offset` gives it volume.
+///   literal     as printed: node gradients interpolated, small steps along them, F = k (p_c - p_t) - b V with all of
+///               the velocity, friction by the tick, whatever its length (its errata: F_r for F_v in p_n; f_v over 1
+///               reverses, so it is kept under 0.999)
+///   consistent  F = -grad(k f^2 / 2) of the potential's own reconstruction: no work in a closed loop, continuous where
+///               the reconstruction is; p_c = p_t + F / k. Damping never pulls. Friction by the millisecond
+///               (formulation, amendment 15). Changes of local stiffness give no more energy than they took
+struct VirtualContactPointLaw {
+  Formulation formulation = Formulation::consistent;
+  ContactMagnitude magnitude = ContactMagnitude::distance;  ///< literal alone; the consistent form has one magnitude
+  double depth_gain = 0.0;                                  ///< d of eq. 2 (1/m), 0 or more
+  /// Offset surface for thin objects (Fig. 6a): the force pushes out to where the potential is this (m), 0 or more;
+  /// direction, friction and material are those of the original surface's point.
+  double offset = 0.0;
+};
+
+/// Magnetic surface (hybrid-surface-2004, Fig. 6b): within a band outside the surface the probe is drawn to it, inside
+/// it is pushed out as by the virtual contact point.
+///   literal     attraction k f, which drops to 0 at the band's edge
+///   consistent  k f (1 - (f / band)^2)^2, the slope of a potential: continuous, and a loop in and out does no work
+struct MagneticLaw {
+  Formulation formulation = Formulation::consistent;
+  double band = 0.002;  ///< m, above 0
+};
+
+/// The rival of implicit haptic texturing (hybrid-surface-2004, Fig. 10a; Ho, Basdogan and Srinivasan 1999): the
+/// contact is the untextured mesh's nearest point, the force along its face's normal turned by the slope of the
+/// texture's height there, and longer by that height. Force and direction jump where the nearest face changes.
+struct NormalPerturbationLaw {};
+
+using Law =
+    std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw, GeneratedGeometryLaw,
+                 DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw, MagneticLaw, NormalPerturbationLaw>;
 
 /// "proxy", "god-object", "force-shading", "height-field", "mesostructure", the last two with "-literal" appended where
-/// it is, "generated-geometry", "dense-mesh", "avila", "cross-uncross" (and "-literal"). [any]
+/// it is, "generated-geometry", "dense-mesh", "avila", "cross-uncross", "virtual-contact-point", "magnetic" (and
+/// "-literal"), "normal-perturbation". [any]
 std::string law_name(const Law& law);
 /// The law of that name with default options. Errors: bad_value listing the names. [any]
 Result<Law> law_by_name(std::string_view name);
@@ -120,6 +161,12 @@ Status validate(const Law& law);
 /// Whether the law reads a scalar field, and so is felt on isosurfaces alone. [any]
 constexpr bool needs_field(const Law& law) noexcept {
   return std::holds_alternative<AvilaLaw>(law) || std::holds_alternative<CrossUncrossLaw>(law);
+}
+
+/// Whether the law reads a potential on a sparse grid, and so is felt on implicit surfaces alone. [any]
+constexpr bool needs_potential(const Law& law) noexcept {
+  return std::holds_alternative<VirtualContactPointLaw>(law) || std::holds_alternative<MagneticLaw>(law) ||
+         std::holds_alternative<NormalPerturbationLaw>(law);
 }
 
 /// Whether the law takes part in the joint constraint solve (it moves the proxy) rather than adding a force of its own.

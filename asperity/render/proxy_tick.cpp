@@ -36,15 +36,17 @@ bool smooth(const Instance& instance) noexcept {
   return proxied_relief(instance) != nullptr || proxied_iso(instance) != nullptr;
 }
 
-/// One smooth surface, touched by a point.
-ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& from,
-                      const ProbeSample& probe) noexcept {
+/// One smooth surface, touched by a point, or by a ball where the surface has one level further out for it.
+ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& from, const ProbeSample& probe,
+                      double radius) noexcept {
   const Pose& pose = instance.world_from_object;
   const bool at_origin = pose.is_identity();
   const Vec3& position = probe.pose.position;
-  const Friction friction = friction_of(instance);
   const Vec3 local_from = at_origin ? from : pose.apply_inverse(from);
   const Vec3 local_probe = at_origin ? position : pose.apply_inverse(position);
+  // Friction is that of the place where the proxy rests.
+  const Vec3& place = slot.touching ? slot.iso.point : local_from;
+  const Friction friction = friction_of(instance, felt_material(instance, place, slot));
   const ReliefSurface* relief = proxied_relief(instance);
   const ProxyRest rest = relief != nullptr
                              ? solve_on_relief(*relief, instance.sides, friction, local_from, local_probe, slot)
@@ -54,24 +56,26 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
   answer.converged = rest.converged;
   answer.proxy = position;
   LawForce law;
+  Material material = instance.material;
   if (rest.contact) {
+    material = felt_material(instance, rest.proxy - radius * rest.normal, slot);
     law.contact = true;
     answer.proxy = at_origin ? rest.proxy : pose.apply(rest.proxy);
     law.normal = at_origin ? rest.normal : pose.rotate(rest.normal);
     const Vec3 spring = answer.proxy - position;
     law.penetration = spring.norm();
-    law.force = with_damping(on_cone(instance.material.stiffness * spring, law.normal, friction, slot.sliding),
-                             law.normal, probe.twist.linear, instance.material.damping);
-    law.point = answer.proxy;
+    law.force = with_damping(on_cone(material.stiffness * spring, law.normal, friction, slot.sliding), law.normal,
+                             probe.twist.linear, material.damping);
+    law.point = answer.proxy - radius * law.normal;
     if (relief != nullptr) {
       law.height = slot.point.jet.height;
       law.element = slot.hint.relief.frame.face;
     } else {
-      law.element = proxied_iso(instance)->element_of(slot.iso.level, slot.iso.point);
+      law.element = element_at(instance, rest.proxy - radius * rest.normal, slot);
     }
   }
   answer.felt = answer.proxy;
-  answer.parts.push_back({slot.instance, law});
+  answer.parts.push_back({slot.instance, law, material.stiffness});
   return answer;
 }
 
@@ -98,15 +102,15 @@ struct Hold {
   Vec3 normal = Vec3::Zero();
 };
 
-template <class InstanceOf>
-Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const InstanceOf& instance_of) noexcept {
+template <class FrictionOf>
+Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const FrictionOf& friction_of_owner) noexcept {
   const PlaneProjection projection = project_onto_planes(goal, planes, false);
   Hold hold;
   double strongest = 0.0;
   for (const PlaneProjection::Active& active : projection.active) {
     if (active.multiplier <= strongest) continue;
     strongest = active.multiplier;
-    hold.friction = friction_of(instance_of(planes[active.plane].owner));
+    hold.friction = friction_of_owner(planes[active.plane].owner);
   }
   const Vec3 push = projection.point - goal;
   const double length = push.norm();
@@ -115,10 +119,10 @@ Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const InstanceOf& 
 }
 
 /// Solves with Coulomb friction: each round leads the proxy to the probe as far as the cone lets it go.
-template <class Touched, class Solve, class InstanceOf>
+template <class Touched, class Solve, class FrictionOf>
 ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
                                        const Touched& touched, const Solve& solve,
-                                       const InstanceOf& instance_of) noexcept {
+                                       const FrictionOf& friction_of_owner) noexcept {
   constexpr int most_rounds = 4;
   constexpr double on_cone = 1e-6;
   ConstraintSolution solution;
@@ -139,13 +143,13 @@ ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool
     return still;
   };
   for (int round = 0; round < most_rounds; ++round) {
-    const Hold hold = strongest_hold(planes, probe, instance_of);
+    const Hold hold = strongest_hold(planes, probe, friction_of_owner);
     if (hold.friction.still <= 0.0 || hold.normal.isZero()) {
       // In free space, or without friction, the proxy goes all the way; what it meets then decides.
       goal = probe;
       solution = solve(proxy, goal);
       if (planes.empty() && !solution.planes.empty() && round == 0) {
-        const Hold met = strongest_hold(solution.planes, probe, instance_of);
+        const Hold met = strongest_hold(solution.planes, probe, friction_of_owner);
         if (met.friction.still > 0.0) {
           // It met something with friction: it would have stopped there, not slid on for nothing.
           planes = solution.planes;
@@ -176,14 +180,13 @@ ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool
 }
 
 /// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
-void limit_energy(const Scene& scene, ProxyState& state, const Vec3& before, const Vec3& probe,
-                  ProxyAnswer& answer) noexcept {
+void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, ProxyAnswer& answer) noexcept {
   double stiffness = 0.0;
   double strongest = 0.0;
   for (const ProxyAnswer::Part& part : answer.parts) {
     if (!part.law.contact || part.law.penetration < strongest) continue;
     strongest = part.law.penetration;
-    stiffness = scene.instances()[part.instance].material.stiffness;
+    stiffness = part.stiffness;
   }
   if (stiffness == 0.0) {
     state.stiffness = 0.0;
@@ -235,11 +238,19 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
     const bool settled = solution.converged && solution.projection.feasible;
     answer.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
     for (std::size_t i = 0; i < solver.size(); ++i) {
-      LawForce law = owner_force(solver.instance(i), i, solution, goal, probe);
-      if (std::holds_alternative<ForceShadingLaw>(solver.instance(i).law))
+      const Instance& instance = solver.instance(i);
+      const Material material =
+          felt_material(instance, instance.world_from_object.apply_inverse(solution.proxy), solver.state(i));
+      LawForce law = owner_force(instance, material, i, solution, goal, probe);
+      if (std::holds_alternative<ForceShadingLaw>(instance.law))
         add_turn(solver.state(i), law, position - state.previous_probe);
-      answer.parts.push_back({solver.state(i).instance, law});
+      answer.parts.push_back({solver.state(i).instance, law, material.stiffness});
     }
+  };
+  const auto friction_in = [&](auto& solver, std::uint32_t owner) {
+    const Instance& instance = solver.instance(owner);
+    const Vec3 place = instance.world_from_object.apply_inverse(before);
+    return friction_of(instance, felt_material(instance, place, solver.state(owner)));
   };
   if (smooth_slot == nullptr) {
     MeshConstraints constraints(scene.probe_radius());
@@ -251,10 +262,11 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
         before, position, state.sliding, goal,
         [&](const Vec3& at, PlaneSet& planes) { constraints.contacts(at, planes); },
         [&](const Vec3& from, const Vec3& to) { return solve_constraints(constraints, from, to); },
-        [&](std::uint32_t owner) -> const Instance& { return constraints.instance(owner); });
+        [&](std::uint32_t owner) { return friction_in(constraints, owner); });
     gather(constraints, solution, goal);
-  } else if (constrained == 1 && scene.probe_radius() == 0.0) {
-    answer = on_smooth(scene.instances()[smooth_slot->instance], *smooth_slot, before, probe);
+  } else if (constrained == 1 &&
+             (scene.probe_radius() == 0.0 || ball_level(scene.instances()[smooth_slot->instance], scene) > 0.0)) {
+    answer = on_smooth(scene.instances()[smooth_slot->instance], *smooth_slot, before, probe, scene.probe_radius());
   } else {
     JointProxy joint(scene.probe_radius());
     Vec3 from = before;
@@ -277,10 +289,10 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
     const ConstraintSolution solution = solve_with_friction(
         from, position, state.sliding, goal, [&](const Vec3& at, PlaneSet& planes) { joint.touched(at, planes); },
         [&](const Vec3& start, const Vec3& to) { return joint.solve(start, to); },
-        [&](std::uint32_t owner) -> const Instance& { return joint.instance(owner); });
+        [&](std::uint32_t owner) { return friction_in(joint, owner); });
     gather(joint, solution, goal);
   }
-  limit_energy(scene, state, held, position, answer);
+  limit_energy(state, held, position, answer);
   return answer;
 }
 
@@ -297,13 +309,14 @@ Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
     if (iso_of(instance.surface) != nullptr) {
       // A point in touch moves with its isosurface (update_felt); here is one that the scene newly has.
       if (slot.touching || slot.iso.field != 0) continue;
-      const IsoView view = iso_of(instance.surface)->view();
+      const IsoSurface& iso = *iso_of(instance.surface);
+      const IsoView view = iso.view_at(0, iso.threshold() + ball_level(instance, scene));
       FieldJet jet;
       if (!view.sample(local, slot.hint.iso, jet) || view.sigma * (jet.value - view.threshold) >= 0.0) continue;
       foot = view.closest(local, infinity, slot.hint.iso);
       if (!foot.found()) continue;
       front = view.outward(foot.point, slot.hint.iso);
-      skin = view.skin();
+      skin = view.skin() - (ball_level(instance, scene) > 0.0 ? scene.probe_radius() : 0.0);
     } else if (const ReliefSurface* relief = proxied_relief(instance)) {
       foot = relief->closest(local, infinity, slot.hint);
       if (!foot.found()) continue;

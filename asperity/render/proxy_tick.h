@@ -10,6 +10,7 @@ struct ProxyAnswer {
   struct Part {
     std::uint32_t instance = no_index;
     LawForce law;
+    double stiffness = 0.0;  ///< N/m, where it is touched
   };
   Vec3 proxy = Vec3::Zero();  ///< to carry to the next tick (m)
   Vec3 felt = Vec3::Zero();   ///< to show: without skins

@@ -41,23 +41,61 @@ Status make_dense(Instance& instance, std::size_t index) {
   return success();
 }
 
+/// Whether the law's reach lies within the band that the potential is stored in, and what it reads is there.
+Status check_potential(const Instance& instance, const std::string& place) {
+  const ImplicitSurface& surface = *implicit_of(instance.surface);
+  double reach = 0.0;
+  const char* key = ".offset";
+  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&instance.law)) reach = contact->offset;
+  if (const auto* magnetic = std::get_if<MagneticLaw>(&instance.law)) {
+    reach = magnetic->band;
+    key = ".band";
+  }
+  if (reach > surface.reach_outside()) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach),
+                             instance.name, format_length(surface.grid().outside())),
+                 {},
+                 place + ".law" + key,
+                 fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside()))};
+  }
+  if (std::holds_alternative<NormalPerturbationLaw>(instance.law) &&
+      (surface.mesh() == nullptr || !surface.textured())) {
+    return Error{ErrorCode::unsupported_pair,
+                 fmt::format("the law \"normal-perturbation\" needs a mesh with a texture, and \"{}\" has no {}",
+                             instance.name, surface.mesh() == nullptr ? "mesh" : "texture"),
+                 {},
+                 place + ".law",
+                 "another law, or implicit.texture on a mesh"};
+  }
+  return success();
+}
+
 /// Whether the law can be felt on the surface at all.
 Status check_pair(const Instance& instance, const std::string& place) {
   const bool iso = iso_of(instance.surface) != nullptr;
+  const bool implicit = implicit_of(instance.surface) != nullptr;
   const bool bare = instance.surface.index() == 0;
   const auto refuse = [&](const char* what, const char* accepted) {
     return Error{ErrorCode::unsupported_pair,
                  fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
-                             iso    ? "an isosurface"
-                             : bare ? "a bare mesh"
-                                    : "a relief"),
+                             implicit ? "an implicit surface"
+                             : iso    ? "an isosurface"
+                             : bare   ? "a bare mesh"
+                                      : "a relief"),
                  {},
                  place + ".law",
                  accepted};
   };
   if (needs_field(instance.law) && !iso) return refuse("a volume", "another law, or a surface with a volume");
-  if (iso && !needs_field(instance.law) && !std::holds_alternative<ProxyLaw>(instance.law))
-    return refuse(needs_coat(instance.law) ? "a coat" : "triangles", "proxy, avila or cross-uncross");
+  if (needs_potential(instance.law) && !implicit)
+    return refuse("an implicit surface", "another law, or a surface with \"implicit\"");
+  if (implicit && needs_potential(instance.law)) return check_potential(instance, place);
+  if (iso && !needs_field(instance.law) && !std::holds_alternative<ProxyLaw>(instance.law)) {
+    return refuse(needs_coat(instance.law) ? "a coat" : "triangles",
+                  implicit ? "proxy, virtual-contact-point, magnetic, normal-perturbation, avila or cross-uncross"
+                           : "proxy, avila or cross-uncross");
+  }
   if (bare && needs_coat(instance.law))
     return refuse("a coat", "proxy, god-object or force-shading, or a coat on the mesh");
   return success();
@@ -66,7 +104,11 @@ Status check_pair(const Instance& instance, const std::string& place) {
 Status check(const Instance& instance, std::size_t index, double probe_radius) {
   const std::string place = fmt::format("surfaces[{}]", index);
   if (std::visit([](const auto& surface) { return surface == nullptr; }, instance.surface)) {
-    return Error{ErrorCode::bad_value, "holds no surface", {}, place + ".surface", "a mesh, relief or isosurface"};
+    return Error{ErrorCode::bad_value,
+                 "holds no surface",
+                 {},
+                 place + ".surface",
+                 "a mesh, relief, isosurface or implicit surface"};
   }
   ASPERITY_CHECK(check_pair(instance, place));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
@@ -103,7 +145,7 @@ Box transformed(const Box& box, const Pose& pose) {
 }  // namespace
 
 const char* surface_kind(const Surface& surface) {
-  constexpr const char* names[] = {"mesh", "relief", "iso"};
+  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit"};
   return names[surface.index()];
 }
 
@@ -113,11 +155,18 @@ Box surface_bounds(const Surface& surface) {
 
 const MeshSurface* base_of(const Surface& surface) noexcept {
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return &(*relief)->base();
+  if (const ImplicitSurface* implicit = implicit_of(surface)) return implicit->mesh();
   const auto* mesh = std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
   return mesh != nullptr ? mesh->get() : nullptr;
 }
 
+const ImplicitSurface* implicit_of(const Surface& surface) noexcept {
+  const auto* implicit = std::get_if<std::shared_ptr<const ImplicitSurface>>(&surface);
+  return implicit != nullptr ? implicit->get() : nullptr;
+}
+
 const IsoSurface* iso_of(const Surface& surface) noexcept {
+  if (const ImplicitSurface* implicit = implicit_of(surface)) return &implicit->iso();
   const auto* iso = std::get_if<std::shared_ptr<const IsoSurface>>(&surface);
   return iso != nullptr ? iso->get() : nullptr;
 }
@@ -164,7 +213,9 @@ std::size_t Scene::memory_bytes() const noexcept {
   std::size_t bytes = sizeof(*this);
   for (const Instance& instance : instances_) {
     if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
-    if (const IsoSurface* iso = iso_of(instance.surface)) {
+    if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
+      bytes += implicit->memory_bytes();
+    } else if (const IsoSurface* iso = iso_of(instance.surface)) {
       bytes += iso->field().memory_bytes();
     } else if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {
       bytes += (*relief)->base().index().memory_bytes() + (*relief)->coat().memory_bytes();

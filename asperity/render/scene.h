@@ -13,6 +13,7 @@
 #include "asperity/material/material.h"
 #include "asperity/render/field_effects.h"
 #include "asperity/render/laws.h"
+#include "asperity/surface/implicit_surface.h"
 #include "asperity/surface/iso_surface.h"
 #include "asperity/surface/mesh_surface.h"
 #include "asperity/surface/relief_surface.h"
@@ -21,16 +22,18 @@ namespace asperity {
 
 /// The closed set of providers. Shared, because snapshots that follow one another share what did not change.
 using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr<const ReliefSurface>,
-                             std::shared_ptr<const IsoSurface>>;
+                             std::shared_ptr<const IsoSurface>, std::shared_ptr<const ImplicitSurface>>;
 
-/// "mesh", "relief", "iso": the provider's name in messages. [any]
+/// "mesh", "relief", "iso", "implicit": the provider's name in messages. [any]
 const char* surface_kind(const Surface& surface);
 /// Bounds in the object frame (m). [any]
 Box surface_bounds(const Surface& surface);
-/// The mesh that carries the surface; nullptr for an isosurface. [any]
+/// The mesh that carries the surface, or that an implicit surface was made from; nullptr where there is none. [any]
 const MeshSurface* base_of(const Surface& surface) noexcept;
-/// The isosurface, or nullptr. [any]
+/// The isosurface, also the one of an implicit surface's potential, or nullptr. [any]
 const IsoSurface* iso_of(const Surface& surface) noexcept;
+/// The implicit surface, or nullptr. [any]
+const ImplicitSurface* implicit_of(const Surface& surface) noexcept;
 /// The mesh of a surface that has one. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 

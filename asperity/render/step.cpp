@@ -59,35 +59,47 @@ bool update_slots(const Scene& scene, ProxyState& state, const Box& reach) noexc
   return all;
 }
 
-LawForce force_at(const Instance& instance, const Vec3& probe, const Vec3& velocity, ContactState& slot) noexcept {
+/// `material`: felt at the probe.
+LawForce force_at(const Instance& instance, const Material& material, const Vec3& probe, const Vec3& velocity,
+                  Seconds dt, ContactState& slot) noexcept {
+  if (needs_potential(instance.law)) {
+    const ImplicitSurface& surface = *implicit_of(instance.surface);
+    if (const auto* law = std::get_if<VirtualContactPointLaw>(&instance.law))
+      return virtual_contact_force(*law, surface, instance.material, probe, velocity, dt, slot);
+    if (const auto* law = std::get_if<MagneticLaw>(&instance.law))
+      return magnetic_force(*law, surface, instance.material, probe, velocity, dt, slot);
+    return normal_perturbation_force(surface, material, probe, slot);
+  }
   if (const IsoSurface* iso = iso_of(instance.surface)) {
     const IsoView view = felt_view(*iso, slot);
     if (const auto* law = std::get_if<AvilaLaw>(&instance.law))
-      return avila_force(*law, *iso, view, instance.material, probe, velocity, slot);
-    return cross_uncross_force(*std::get_if<CrossUncrossLaw>(&instance.law), *iso, view, instance.material, probe,
-                               velocity, slot);
+      return avila_force(*law, *iso, view, material, probe, velocity, slot);
+    return cross_uncross_force(*std::get_if<CrossUncrossLaw>(&instance.law), *iso, view, material, probe, velocity,
+                               slot);
   }
   const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   if (const auto* law = std::get_if<HeightFieldLaw>(&instance.law)) {
-    return height_field_force(*law, relief, instance.material, probe, slot);
+    return height_field_force(*law, relief, material, probe, slot);
   }
-  return mesostructure_force(*std::get_if<MesostructureLaw>(&instance.law), relief, instance.material, probe, slot);
+  return mesostructure_force(*std::get_if<MesostructureLaw>(&instance.law), relief, material, probe, slot);
 }
 
 /// A law without a proxy, in the world frame.
 LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick,
-                     ContactState& slot) noexcept {
+                     Seconds dt, ContactState& slot) noexcept {
   const Pose& pose = instance.world_from_object;
   const Vec3 velocity = pose.rotate_inverse(probe.twist.linear);
   // A probe that enters within one tick was outside at the last one: ask there first.
   const IsoSurface* iso = iso_of(instance.surface);
   const bool fresh = iso != nullptr ? !slot.iso.started : !slot.seen_outside;
-  if (fresh && !first_tick) force_at(instance, pose.apply_inverse(previous), velocity, slot);
-  LawForce law = force_at(instance, pose.apply_inverse(probe.pose.position), velocity, slot);
+  const Vec3 position = pose.apply_inverse(probe.pose.position);
+  const Material material = felt_material(instance, position, slot);
+  if (fresh && !first_tick) force_at(instance, material, pose.apply_inverse(previous), velocity, dt, slot);
+  LawForce law = force_at(instance, material, position, velocity, dt, slot);
   if (!law.contact) return law;
-  if (iso != nullptr) law.element = iso->element_of(slot.iso.level, law.point);
-  law.force =
-      with_damping(pose.rotate(law.force), pose.rotate(law.normal), probe.twist.linear, instance.material.damping);
+  if (iso != nullptr) law.element = element_at(instance, law.point, slot);
+  law.force = pose.rotate(law.force);
+  if (!law.damped) law.force = with_damping(law.force, pose.rotate(law.normal), probe.twist.linear, material.damping);
   law.point = pose.apply(law.point);
   law.normal = pose.rotate(law.normal);
   return law;
@@ -231,7 +243,9 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
     if (iso == nullptr) continue;
     const Pose& pose = instance.world_from_object;
     const int here = std::min(level, iso->field().levels() - 1);
-    moved = update_felt(*iso, instance.sides, here, dt, pose.apply_inverse(state.proxy), slot) || moved;
+    moved = update_felt(*iso, ball_level(instance, scene), instance.sides, here, dt, pose.apply_inverse(state.proxy),
+                        slot) ||
+            moved;
   }
   // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
   const Vec3 held = state.proxy;
@@ -241,7 +255,7 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.instances()[slot.instance];
     if (constrains(instance.law)) continue;
-    const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, slot);
+    const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, dt, slot);
     slot.touching = law.contact;
     tick.add(slot.instance, law);
     if (law.contact) shadow = law.point;

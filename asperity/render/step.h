@@ -8,7 +8,9 @@
 
 namespace asperity {
 
-/// What one probe remembers of an isosurface between ticks.
+/// What one probe remembers of an isosurface between ticks. The virtual contact point and the magnet keep in it the
+/// contact point p_c (`point`), the direction they push (`normal`), the last probe (`previous`), the stiffness felt
+/// (`value`; 0 in free space) and whether they pushed at the last tick (`crossed`).
 struct IsoContact {
   std::uint64_t field = 0;       ///< identity of the field that the rest belongs to; 0: none yet
   double threshold = 0.0;        ///< felt now: on its way to the scene's own
@@ -31,10 +33,12 @@ struct ContactState {
   bool touching = false;  ///< pushed at the last tick; for the proxy on a relief: held by the surface at hint.relief
   bool sliding = false;   ///< proxy: friction was overcome at the last tick
   Vec3 turned = Vec3::Zero();  ///< consistent force shading: its lateral force of the last tick (N, world)
-  double turn_budget = 0.0;    ///< what that has taken from the hand and not yet given back (J)
-  double side = 1.0;           ///< proxy on a relief: 1 when touched from the front, -1 from the back
-  ReliefPoint point;           ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
-  IsoContact iso;              ///< on an isosurface
+  /// What that has taken from the hand and not yet given back (J); laws of implicit surfaces: what may be spent where
+  /// the local stiffness rises.
+  double turn_budget = 0.0;
+  double side = 1.0;  ///< proxy on a relief: 1 when touched from the front, -1 from the back
+  ReliefPoint point;  ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
+  IsoContact iso;     ///< on an isosurface
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per

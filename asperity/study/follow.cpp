@@ -88,7 +88,8 @@ Result<double> share_detected(const std::shared_ptr<const IsoSurface>& surface, 
 
 const Instance* followed_instance(const Scene& scene) noexcept {
   for (const Instance& instance : scene.instances()) {
-    if (iso_of(instance.surface) != nullptr) return &instance;
+    // An implicit surface follows its mesh.
+    if (iso_of(instance.surface) != nullptr && implicit_of(instance.surface) == nullptr) return &instance;
   }
   return nullptr;
 }

@@ -61,10 +61,15 @@ ForceMetrics measure_force(std::span<const TraceRecord> records, const RunSeries
   return m;
 }
 
-DirectionMetrics measure_direction(const RunSeries& series) {
+/// Of all ticks, or of those near a sharp edge or away from all of them.
+enum class Where { everywhere, near_edges, elsewhere };
+
+DirectionMetrics measure_direction(const RunSeries& series, Where where) {
   std::vector<double> angles;
   for (std::size_t i = 0; i < series.size(); ++i) {
-    if (series.stroking[i] && std::isfinite(series.direction_error[i])) angles.push_back(series.direction_error[i]);
+    if (!series.stroking[i] || !std::isfinite(series.direction_error[i])) continue;
+    const bool near = i < series.near_edge.size() && series.near_edge[i] != 0;
+    if (where == Where::everywhere || near == (where == Where::near_edges)) angles.push_back(series.direction_error[i]);
   }
   DirectionMetrics m;
   m.samples = angles.size();
@@ -242,7 +247,9 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& se
   RunMetrics m;
   m.ticks = measure_ticks(records, series);
   m.force = measure_force(records, series);
-  m.direction = measure_direction(series);
+  m.direction = measure_direction(series, Where::everywhere);
+  m.direction_near = measure_direction(series, Where::near_edges);
+  m.direction_far = measure_direction(series, Where::elsewhere);
   m.height = measure_height(series);
   m.spectrum = measure_spectrum(series, m.ticks);
   m.update = measure_update(series);
@@ -274,6 +281,14 @@ double percentile(std::span<const double> values, double p) {
   return finite[index];
 }
 
+namespace {
+
+nlohmann::json direction_part(const DirectionMetrics& m) {
+  return {{"samples", m.samples}, {"mean", number(m.mean)}, {"p99", number(m.p99)}, {"max", number(m.max)}};
+}
+
+}  // namespace
+
 std::string metrics_json(const RunMetrics& m) {
   nlohmann::json flags;
   for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) flags[flag_name(bit)] = m.ticks.flags[bit];
@@ -300,7 +315,9 @@ std::string metrics_json(const RunMetrics& m) {
                                 {{"samples", m.direction.samples},
                                  {"mean", number(m.direction.mean)},
                                  {"p99", number(m.direction.p99)},
-                                 {"max", number(m.direction.max)}}},
+                                 {"max", number(m.direction.max)},
+                                 {"near_edges", direction_part(m.direction_near)},
+                                 {"elsewhere", direction_part(m.direction_far)}}},
                                {"height",
                                 {{"samples", m.height.samples},
                                  {"excluded", m.height.excluded},

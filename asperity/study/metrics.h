@@ -89,6 +89,8 @@ struct RunMetrics {
   TickMetrics ticks;
   ForceMetrics force;
   DirectionMetrics direction;
+  DirectionMetrics direction_near;  ///< near sharp edges of the geometry
+  DirectionMetrics direction_far;   ///< elsewhere
   HeightMetrics height;
   SpectrumMetrics spectrum;
   UpdateMetrics update;

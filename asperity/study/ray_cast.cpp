@@ -59,6 +59,14 @@ Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direc
   return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
 }
 
+/// The mesh that an implicit surface was made from is there to be seen; where what is felt differs, that is shown.
+Pixel first_hit(const ImplicitSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  if (surface.mesh() != nullptr && !surface.textured() && surface.offset() == 0.0)
+    return first_hit(*surface.mesh(), origin, direction, part, surface.mesh()->natural_sides(), hint);
+  return first_hit(surface.iso(), origin, direction, part, sides, hint);
+}
+
 /// Whether a point over an open mesh lies beside its rim: the implicit relief goes on there, what is felt does not.
 bool beside_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
   const Foot foot = surface.base().closest(point, infinity, hint);

@@ -66,8 +66,10 @@ bool step_along(const TriangleMesh& mesh, const Coat& coat, const BasePoint& at,
 /// Derives one tick after the other; keeps the hints of the queries.
 class SeriesBuilder {
  public:
-  SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks)
+  SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks, const SeriesSettings& settings)
       : scene_(scene),
+        shapes_(settings.exact != nullptr ? *settings.exact : scene),
+        edge_reach_(settings.edge_reach),
         path_(path),
         hints_(std::make_unique<Hint[]>(scene.instances().size())),
         followed_(followed_instance(scene)) {
@@ -100,6 +102,12 @@ class SeriesBuilder {
   RunSeries take() { return std::move(out_); }
 
  private:
+  /// An implicit surface without a texture is judged by the mesh that it was made from.
+  static bool has_exact_mesh(const Surface& surface) {
+    const ImplicitSurface* implicit = implicit_of(surface);
+    return implicit != nullptr && implicit->mesh() != nullptr && !implicit->textured() && implicit->offset() == 0.0;
+  }
+
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
     const std::uint32_t index = tick.rendered.contact.instance;
     const bool known = tick.rendered.flags.has(TickFlag::contact) && index < scene_.instances().size();
@@ -127,24 +135,29 @@ class SeriesBuilder {
     out_.relief.push_back(nan);
     out_.direction_error.push_back(nan);
     out_.near_step.push_back(0);
+    out_.near_edge.push_back(0);
     const Instance* instance = touched(tick);
     if (!instance) return;
-    if (iso_of(instance->surface) != nullptr) {
-      add_isosurface(*instance, tick);
+    const Surface& shape = shapes_.instances()[tick.rendered.contact.instance].surface;
+    if (iso_of(shape) != nullptr && !has_exact_mesh(shape)) {
+      add_isosurface(*instance, *iso_of(shape), tick);
+      if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
+        add_texture(*instance, *implicit, tick);
       return;
     }
     const Pose& pose = instance->world_from_object;
-    const MeshSurface& base = *base_of(instance->surface);
+    const MeshSurface& base = *base_of(shape);
     const bool proxied = constrains(instance->law);
     const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
     Hint& hint = hints_[tick.rendered.contact.instance];
     BasePoint at = base_point(base, felt, hint);
     if (at.face == no_index) return;
     const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
-    in_shell(*instance, felt, hint, at);
-    add_height(*instance, at, proxied ? 0.0 : force.dot(at.up) / instance->material.stiffness, force);
-    add_direction(*instance, at, force);
-    if (const Coat* coat = coat_of(instance->surface)) {
+    out_.near_edge.back() = near_sharp_edge(base, felt - at.height * at.up) ? 1 : 0;
+    in_shell(shape, felt, hint, at);
+    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / instance->material.stiffness, force);
+    add_direction(*instance, shape, at, force);
+    if (const Coat* coat = coat_of(shape)) {
       const Vec3 along = pose.rotate_inverse(tangent);
       const bool near =
           step_along(base.mesh(), *coat, at, along) || step_along(base.mesh(), *coat, at, along.cross(at.up));
@@ -152,8 +165,28 @@ class SeriesBuilder {
     }
   }
 
-  void add_isosurface(const Instance& instance, const TraceRecord& tick) {
-    const IsoSurface& surface = *iso_of(instance.surface);
+  /// Whether an edge that folds sharply comes within the reach of a point of the base.
+  bool near_sharp_edge(const MeshSurface& base, const Vec3& point) const {
+    constexpr double sharp = 0.9396926207859084;  // cosine of 20 degrees
+    const TriangleMesh& mesh = base.mesh();
+    Box box;
+    box.include(point);
+    bool near = false;
+    base.index().for_each_in_box(box.grown(edge_reach_), [&](std::uint32_t face) {
+      for (int edge = 0; edge < 3 && !near; ++edge) {
+        const std::uint32_t other = mesh.neighbour(face, edge);
+        if (other == no_index || mesh.face_normal(face).dot(mesh.face_normal(other)) > sharp) continue;
+        const auto corners = mesh.corners(face);
+        const Vec3& from = corners[static_cast<std::size_t>(edge)];
+        const Vec3 way = corners[static_cast<std::size_t>((edge + 1) % 3)] - from;
+        const double t = std::clamp((point - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
+        near = (point - from - t * way).norm() <= edge_reach_;
+      }
+    });
+    return near;
+  }
+
+  void add_isosurface(const Instance& instance, const IsoSurface& surface, const TraceRecord& tick) {
     const Pose& pose = instance.world_from_object;
     const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
     const bool proxied = constrains(instance.law);
@@ -174,9 +207,27 @@ class SeriesBuilder {
     out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
   }
 
+  /// Heights over the mesh where a texture, or an offset, is what is felt.
+  void add_texture(const Instance& instance, const ImplicitSurface& surface, const TraceRecord& tick) {
+    const Pose& pose = instance.world_from_object;
+    const bool proxied = constrains(instance.law);
+    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
+    Hint& hint = hints_[tick.rendered.contact.instance];
+    const BasePoint at = base_point(*surface.mesh(), felt, hint);
+    if (at.face == no_index) return;
+    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const double deflection = proxied ? 0.0 : force.dot(at.up) / instance.material.stiffness;
+    const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
+    const Vec3 base = felt - at.height * at.up;
+    const SweptHit met = surface.segment({base + reach * at.up, base - reach * at.up}, 0.0, Sides::front, hint);
+    out_.followed.back() = met.hit ? at.height + deflection - scene_.probe_radius() : nan;
+    out_.relief.back() = met.hit ? reach * (1.0 - 2.0 * met.t) : nan;
+    out_.near_edge.back() = near_sharp_edge(*surface.mesh(), base) ? 1 : 0;
+  }
+
   /// On a coat the shell's coordinates say what is under a point, where its shell reaches.
-  static void in_shell(const Instance& instance, const Vec3& felt, Hint& hint, BasePoint& at) {
-    const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  static void in_shell(const Surface& shape, const Vec3& felt, Hint& hint, BasePoint& at) {
+    const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&shape);
     if (relief == nullptr) return;
     ReliefFrame frame;
     ShellPlace place;
@@ -194,20 +245,20 @@ class SeriesBuilder {
     at.slope = at.up - sample.gradient;
   }
 
-  void add_height(const Instance& instance, const BasePoint& at, double deflection, const Vec3& force) {
-    const Coat* coat = coat_of(instance.surface);
-    const TriangleMesh& mesh = base_mesh(instance.surface);
+  void add_height(const Surface& shape, const BasePoint& at, double deflection, const Vec3& force) {
+    const Coat* coat = coat_of(shape);
+    const TriangleMesh& mesh = base_mesh(shape);
     const bool from_behind = force.dot(mesh.face_normal(at.face)) < 0.0 && !coat;
     const double height = from_behind ? -at.height : at.height;
     out_.followed.back() = height + deflection - scene_.probe_radius();
     out_.relief.back() = coat ? at.relief : 0.0;
   }
 
-  void add_direction(const Instance& instance, const BasePoint& at, const Vec3& force) {
+  void add_direction(const Instance& instance, const Surface& shape, const BasePoint& at, const Vec3& force) {
     if (!(force.norm() >= least_force)) return;
-    const TriangleMesh& mesh = base_mesh(instance.surface);
+    const TriangleMesh& mesh = base_mesh(shape);
     Vec3 reference = mesh.face_normal(at.face);
-    if (coat_of(instance.surface) != nullptr) {
+    if (coat_of(shape) != nullptr) {
       reference = at.slope;
       // A two-sided sheet touched from behind pushes the other way.
       if (follows_relief(instance.law) && reference.dot(force) < 0.0) reference = -reference;
@@ -219,6 +270,8 @@ class SeriesBuilder {
   }
 
   const Scene& scene_;
+  const Scene& shapes_;  ///< what the run is judged by
+  double edge_reach_;
   const StrokePath& path_;
   std::unique_ptr<Hint[]> hints_;
   const Instance* followed_ = nullptr;
@@ -230,8 +283,19 @@ class SeriesBuilder {
 
 }  // namespace
 
-RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path) {
-  SeriesBuilder builder(scene, path, records.size());
+double edge_reach_of(const Scene& scene) {
+  constexpr double voxels = 1.5;
+  double reach = infinity;
+  for (const Instance& instance : scene.instances()) {
+    const ImplicitSurface* implicit = implicit_of(instance.surface);
+    if (implicit != nullptr) reach = std::min(reach, voxels * implicit->grid().voxel());
+  }
+  return std::isfinite(reach) ? reach : SeriesSettings{}.edge_reach;
+}
+
+RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path,
+                        const SeriesSettings& settings) {
+  SeriesBuilder builder(scene, path, records.size(), settings);
   for (const TraceRecord& tick : records) builder.add(tick);
   return builder.take();
 }

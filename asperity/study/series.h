@@ -26,9 +26,10 @@ namespace asperity {
 ///              the touched side
 /// follow       follow error of the probe (FollowMetrics), of the first isosurface of the scene
 ///
-/// On an isosurface there is no base: followed is the signed distance of the felt point from the isosurface (negative
-/// inside), relief is 0, reference is the isosurface's normal at the point of it nearest to the felt one. Laws without
-/// a proxy are felt at probe + F / k.
+/// On an implicit surface with a mesh the mesh is the base; relief is the height of what is felt over it (texture,
+/// offset), reference is the normal of what is felt. On an isosurface there is no base: followed is the signed distance
+/// of the felt point from the isosurface (negative inside), relief is 0, reference is the isosurface's normal at the
+/// point of it nearest to the felt one. Laws without a proxy are felt at probe + F / k.
 struct RunSeries {
   std::vector<double> time;  ///< s
   std::vector<double>
@@ -46,11 +47,23 @@ struct RunSeries {
   std::vector<double> follow;   ///< 0 to 1; not-a-number outside the volume and without an isosurface
   std::vector<double> update;   ///< time that `step` took (s)
   std::vector<char> near_step;  ///< 1 or 0
+  std::vector<char> near_edge;  ///< 1 where the base point lies within SeriesSettings::edge_reach of a sharp edge
   std::vector<char> stroking;   ///< 1 in the stroke's contact phase
   [[nodiscard]] std::size_t size() const noexcept { return time.size(); }
 };
 
+/// What a run is judged by.
+struct SeriesSettings {
+  /// Its surfaces stand for those of the run, one for one: what is felt through another representation is judged by the
+  /// exact geometry. nullptr: the run's own. An implicit surface without texture or offset is judged by its mesh.
+  const Scene* exact = nullptr;
+  double edge_reach = 0.001;  ///< m; edges that fold by 20 degrees or more count
+};
+
 /// Derives the columns of a run. `records` must come from `scene` and `path`. [main]
-RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path);
+RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path,
+                        const SeriesSettings& settings = {});
+/// How far edges are near: one and a half voxels of the scene's finest potential, where it has one, else 1 mm. [any]
+double edge_reach_of(const Scene& scene);
 
 }  // namespace asperity

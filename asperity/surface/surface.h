@@ -8,6 +8,7 @@
 
 #include "asperity/core/math.h"
 #include "asperity/field/cell_polynomial.h"
+#include "asperity/field/sparse_grid.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/triangle_patch.h"
 #include "asperity/surface/relief_frame.h"
@@ -39,6 +40,7 @@ struct Hint {
   TrianglePatch patch;
   ReliefPlace relief;
   IsoHint iso;
+  SparseHint sparse;
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.

@@ -30,10 +30,10 @@ void check_source(const MeshSource& source) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const char* const names[] = {"a.obj", "a.ply", "a.stl", "a"};
+  static const char* const names[] = {"a.obj", "a.ply", "a.stl", "a", "a.gltf"};
   if (size == 0) return 0;
   const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  const char* name = names[data[0] % 4];
+  const char* name = names[data[0] % 5];
   const auto source = asperity::read_mesh_bytes(bytes, name);
   if (!source) {
     require(!source.error().what.empty() && source.error().file == name, "an error names its cause and file");
@@ -85,6 +85,42 @@ std::string binary_ply(bool big) {
   return bytes;
 }
 
+/// Two triangles in a strip, moved by their node; the buffer as `buffer` says.
+std::string gltf_json(const std::string& buffer) {
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"children":[1],"scale":[2,-1,1]},)"
+         R"({"mesh":0,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,5,1]}],"meshes":[{"primitives":[{"attributes":)"
+         R"({"POSITION":0,"TEXCOORD_0":2},"indices":1,"mode":5}]}],"accessors":[{"bufferView":0,"componentType":5126,)"
+         R"("count":4,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},"values":)"
+         R"({"bufferView":0,"byteOffset":12}}},{"bufferView":1,"byteOffset":4,"componentType":5121,"count":4,)"
+         R"("type":"SCALAR"},{"bufferView":2,"componentType":5121,"normalized":true,"count":4,"type":"VEC2"}],)"
+         R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":8},)"
+         R"({"buffer":0,"byteOffset":56,"byteLength":16,"byteStride":4}],"buffers":[{"byteLength":72)" +
+         buffer + "}]}";
+}
+
+std::string text_gltf() {
+  return gltf_json(
+      R"(,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAgD8AAAA/)"
+      R"(AgAAAAABAgMAAAAA/wAAAAD/AAD//wAA")");
+}
+
+std::string binary_gltf() {
+  std::string json = gltf_json("");
+  while (json.size() % 4 != 0) json += ' ';
+  std::string bytes = "glTF";
+  put(bytes, std::uint32_t{2});
+  put(bytes, static_cast<std::uint32_t>(28 + json.size() + 72));
+  put(bytes, static_cast<std::uint32_t>(json.size()));
+  bytes += "JSON" + json;
+  put(bytes, std::uint32_t{72});
+  bytes += std::string("BIN\0", 4);
+  for (const float number : {0.F, 0.F, 0.F, 1.F, 0.F, 0.F, 0.F, 1.F, 0.F, 1.F, 1.F, 0.5F}) put(bytes, number);
+  for (const int byte : {2, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 255, 0, 0, 0, 0, 255, 0, 0, 255, 255, 0, 0}) {
+    put(bytes, static_cast<std::uint8_t>(byte));
+  }
+  return bytes;
+}
+
 /// Each valid file under its own reader, named by the byte in front.
 std::vector<std::string> corpus() {
   const std::string obj =
@@ -99,8 +135,9 @@ std::vector<std::string> corpus() {
       "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e-1 "
       "0\nendloop\nendfacet\nendsolid a\n";
   const std::string zero(1, '\0');
-  std::vector<std::string> files = {zero + obj, "\1" + ply,         "\1" + binary_ply(false), "\1" + binary_ply(true),
-                                    "\2" + stl, "\2" + binary_stl()};
+  std::vector<std::string> files = {
+      zero + obj,          "\1" + ply,         "\1" + binary_ply(false), "\1" + binary_ply(true), "\2" + stl,
+      "\2" + binary_stl(), "\4" + text_gltf(), "\4" + binary_gltf(),     "\3" + binary_gltf()};
   for (const std::string& bytes : {obj, ply, stl, binary_stl()}) files.push_back("\3" + bytes);
   return files;
 }

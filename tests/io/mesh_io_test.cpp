@@ -313,10 +313,10 @@ TEST_F(MeshFiles, ContentAndExtensionChooseTheReader) {
   for (const std::string name : {"b.OBJ", "b", "b.txt"}) EXPECT_TRUE(read_mesh(file(name, triangle_obj)).ok()) << name;
   for (const std::string name : {"c.STL", "c", "c.obj"})
     EXPECT_TRUE(read_mesh(file(name, binary_stl(2, 2))).ok()) << name;
-  const auto unknown = read_mesh(file("d.gltf", "{\"asset\": {}}"));
+  const auto unknown = read_mesh(file("d.fbx", "{\"asset\": {}}"));
   ASSERT_FALSE(unknown.ok());
   EXPECT_EQ(unknown.error().code, ErrorCode::file_unsupported);
-  EXPECT_EQ(unknown.error().file, (folder_ / "d.gltf").string());
+  EXPECT_EQ(unknown.error().file, (folder_ / "d.fbx").string());
 }
 
 TEST_F(MeshFiles, MissingFileFolderAndEmptyFileAreNamed) {

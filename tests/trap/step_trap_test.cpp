@@ -15,6 +15,7 @@
 #include "asperity/field/mesostructure_generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/step.h"
+#include "tests/field/sparse_grids.h"
 #include "tests/field/volumes.h"
 
 namespace {
@@ -165,6 +166,66 @@ Scene volume_scene(const Law& law, CellReconstruction reconstruction, double pro
   return Scene::build({instance}, probe_radius, effects).value();
 }
 
+/// A ball of 30 mm as a potential with local materials.
+Scene potential_scene(const Law& law, CellReconstruction reconstruction, double probe_radius) {
+  static const auto grid = [] {
+    SparseSource source = testing::sparse_ball(0.001, 0.006)->source();
+    for (std::size_t b = 0; b < source.blocks.size(); b += 2) {
+      source.blocks[b].material.resize(SparseBlock::points);
+      for (PointMaterial& m : source.blocks[b].material) m.stiffness = 700.0F;
+    }
+    return std::make_shared<const SparseGrid>(SparseGrid::build(std::move(source)).value());
+  }();
+  static const auto mesh =
+      std::make_shared<const MeshSurface>(TriangleIndex::build(TriangleMesh::build(icosphere(3, 0.03)).value()));
+  Instance instance;
+  instance.name = "ball";
+  instance.law = law;
+  instance.sides = Sides::front;
+  instance.material.damping = 1.0;
+  instance.material.static_friction = 0.3;
+  instance.material.dynamic_friction = 0.2;
+  instance.surface =
+      std::make_shared<const ImplicitSurface>(ImplicitSurface::build({grid, grid, mesh, reconstruction, 0.0}).value());
+  return Scene::build({instance}, probe_radius).value();
+}
+
+TEST(PotentialTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
+#if defined(ASPERITY_SANITIZED)
+  GTEST_SKIP() << "sanitizers replace the same functions";
+#endif
+  for (const char* name : {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "magnetic",
+                           "magnetic-literal", "normal-perturbation", "avila", "cross-uncross"}) {
+    const Law law = law_by_name(name).value();
+    for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
+      for (const double radius : {0.0, 0.002}) {
+        if (radius > 0.0 && !constrains(law)) continue;
+        const Scene scene = potential_scene(law, reconstruction, radius);
+        ProxyState state;
+        int touching = 0;
+        const int ticks = radius > 0.0 ? 300 : 4000;
+        const Counts counts = trapped([&] {
+          for (int i = 0; i < ticks; ++i) {
+            const double s = i * 1e-3;
+            const double reach = i % 500 < 20 ? 0.05 : (i % 700 == 30 ? 0.0 : 0.0295 + 0.001 * std::sin(20.0 * s));
+            ProbeSample probe;
+            probe.pose.position = (reach + radius) * Vec3(std::cos(s), std::sin(1.7 * s), std::sin(s)).normalized();
+            probe.twist.linear = Vec3(0.01, 0.0, -0.02);
+            if (i % 333 == 332) probe.pose.position.x() = std::nan("");
+            if (i % 1000 == 999) state = ProxyState{};
+            touching += step(scene, state, probe, Seconds(1e-3)).flags.has(TickFlag::contact) ? 1 : 0;
+          }
+        });
+        EXPECT_GT(touching, ticks / 8) << name;
+        EXPECT_EQ(counts.allocations, 0) << name;
+        EXPECT_EQ(counts.locks, 0) << name;
+        EXPECT_EQ(counts.throws, 0) << name;
+        EXPECT_EQ(counts.files, 0) << name;
+      }
+    }
+  }
+}
+
 TEST(VolumeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
 #if defined(ASPERITY_SANITIZED)
   GTEST_SKIP() << "sanitizers replace the same functions";
@@ -210,7 +271,6 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   GTEST_SKIP() << "sanitizers replace the same functions";
 #endif
   const Law law = law_by_name(GetParam()).value();
-  if (needs_field(law)) GTEST_SKIP() << "felt on volumes: VolumeTrap";
   for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
     for (const double radius : {0.0, 0.002}) {
       if (radius > 0.0 && !constrains(law)) continue;
@@ -241,7 +301,17 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryLaw, StepTrap, ::testing::ValuesIn(law_names()), [](const auto& parameter) {
+/// The others are felt on volumes: VolumeTrap, PotentialTrap.
+std::vector<std::string> laws_of_meshes() {
+  std::vector<std::string> names;
+  for (const std::string& name : law_names()) {
+    const Law law = law_by_name(name).value();
+    if (!needs_field(law) && !needs_potential(law)) names.push_back(name);
+  }
+  return names;
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryLaw, StepTrap, ::testing::ValuesIn(laws_of_meshes()), [](const auto& parameter) {
   std::string name = parameter.param;
   for (char& c : name) c = c == '-' ? '_' : c;
   return name;

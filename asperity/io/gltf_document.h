@@ -1,0 +1,53 @@
+#pragma once
+// Private to asperity/io: the containers of glTF 2.0 (.gltf, .glb), the strict check of their JSON, and their buffers.
+// tinygltf reads beyond a damaged .glb, takes a default for a key of the wrong type, and opens every file it is told
+// to; so it gets the JSON that passed here and nothing else.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "asperity/core/result.h"
+
+namespace asperity::mesh_readers {
+
+/// A glTF file taken apart and checked. Errors carry no file name, their place is the path within the JSON.
+class GltfDocument {
+ public:
+  /// `bytes` must outlive the document. `folder` is where the files that it names lie; none: they are refused.
+  /// Errors: file_truncated, file_malformed (no JSON, a key of the wrong type), file_unsupported (another version of
+  /// glTF, an extension that it requires), bad_mesh (a reference out of range), too_large. [build]
+  static Result<GltfDocument> open(std::string_view bytes, const std::filesystem::path* folder);
+
+  /// The JSON's geometry: scenes, nodes, meshes, accessors and buffer views. Every value has its type, every reference
+  /// is in range. [build]
+  [[nodiscard]] const std::string& geometry_json() const { return geometry_; }
+  /// The bytes of a buffer, exactly as many as it promises; read on first use. Errors: file_missing, file_truncated,
+  /// file_malformed, file_unsupported, too_large. [build]
+  Result<std::string_view> buffer(std::size_t index);
+  /// What was found and left out. [build]
+  [[nodiscard]] std::vector<std::string>& notes() { return notes_; }
+
+ private:
+  struct Buffer {
+    std::string uri;
+    std::size_t length = 0;
+    std::unique_ptr<std::string> bytes;
+  };
+
+  Status read_container(std::string_view bytes);
+  Status read_json();
+  Status read_external(Buffer& buffer, const std::string& place) const;
+
+  const std::filesystem::path* folder_ = nullptr;
+  std::string_view json_;
+  std::string_view binary_;  ///< the .glb file's own buffer; empty where there is none
+  bool has_binary_ = false;
+  std::string geometry_;
+  std::vector<Buffer> buffers_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace asperity::mesh_readers

@@ -1,0 +1,392 @@
+// Implicit surfaces in a scene file: a mesh made into a potential, or a level set of a file.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/field/material_brush.h"
+#include "asperity/field/mesh_conversion.h"
+#include "asperity/io/scene_reader.h"
+#include "asperity/io/sparse_io.h"
+#include "asperity/surface/implicit_texture.h"
+
+namespace asperity {
+namespace {
+
+const std::vector<std::string>& reconstruction_names() {
+  static const std::vector<std::string> names{"trilinear", "smooth"};
+  return names;
+}
+const std::vector<std::string>& rule_names() {
+  static const std::vector<std::string> names{"automatic", "flood", "winding", "shell"};
+  return names;
+}
+const std::vector<std::string>& redistancing_names() {
+  static const std::vector<std::string> names{"none", "normalised", "redistanced"};
+  return names;
+}
+
+/// What the law reads of the potential besides its zero set (m): how far out, and how far in.
+struct Reach {
+  double outside = 0.0;
+  double inside = 0.0;
+};
+
+Reach reach_of(const ImplicitFeel& feel, const DeviceProfile& device) {
+  Reach reach;
+  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&feel.law)) reach.outside = contact->offset;
+  if (const auto* magnetic = std::get_if<MagneticLaw>(&feel.law)) reach.outside = magnetic->band;
+  // Laws without a proxy read the potential where the probe is: half as deep again as the device's force presses it in.
+  // The proxy does not need that; but what is compared is one potential under several laws.
+  constexpr double margin = 1.5;
+  reach.inside = margin * device.max_force / feel.material.stiffness;
+  return reach;
+}
+
+/// A length, or "all" for as far as the inside goes.
+double read_band_inside(ObjectReader& reader, double fallback) {
+  const SceneJson* value = reader.raw("band_inside");
+  if (value != nullptr && value->is_string() && *value == "all") {
+    reader.write("band_inside", "all");
+    return infinity;
+  }
+  return reader.optional_quantity("band_inside", Dimension::length, Range::positive()).value_or(fallback);
+}
+
+/// Voxel, resolution or budget; bands; rule.
+ConversionSettings read_conversion(ObjectReader& reader, const Box& bounds, const Reach& reach) {
+  ConversionSettings settings;
+  const char* given = nullptr;
+  for (const char* key : {"voxel", "resolution", "budget"}) {
+    if (!reader.has(key)) continue;
+    if (given != nullptr)
+      reader.fail(key, fmt::format("is given beside {}", given), "one of voxel, resolution, budget");
+    given = key;
+  }
+  const double longest = bounds.extent().maxCoeff();
+  double voxel = longest / 64.0;  // of a budget nothing is known yet
+  if (reader.has("voxel")) {
+    settings.voxel = voxel = reader.quantity("voxel", Dimension::length, 0.0, Range::positive());
+  } else if (reader.has("budget")) {
+    settings.budget_bytes = read_bytes(reader, "budget", 0);
+  } else {
+    settings.resolution = static_cast<std::uint32_t>(reader.integer("resolution", 256, 8, 4096));
+    voxel = longest / settings.resolution;
+  }
+  constexpr double spare = 3.0;  // voxels that reconstruction and rounding need beyond what is read
+  const double outside = reach.outside > 0.0 ? reach.outside + spare * voxel : 0.0;
+  const double inside = reach.inside > 0.0 ? reach.inside + spare * voxel : 0.0;
+  settings.band_outside =
+      reader.optional_quantity("band_outside", Dimension::length, Range::positive()).value_or(outside);
+  settings.band_inside = read_band_inside(reader, inside);
+  settings.rule = static_cast<InsideRule>(reader.choice("inside", rule_names(), 0));
+  settings.shell_thickness =
+      reader.optional_quantity("shell_thickness", Dimension::length, Range::positive()).value_or(0.0);
+  if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
+    reader.refuse({"shell_thickness"}, "by this rule of what is inside");
+  return settings;
+}
+
+struct Texture {
+  PointHeight height;
+  double highest = 0.0;  ///< bound (m)
+};
+
+/// Noise. Nothing is read where there is no texture.
+Result<Texture> read_noise(const SceneJson& json, ObjectReader& implicit) {
+  static const std::vector<std::string> types{"gaussian", "gradient"};
+  ObjectReader reader(json, implicit.place_of("texture"), "implicit texture");
+  const bool gaussian = reader.choice("type", types, 1) == 0;
+  const double amplitude = reader.quantity("amplitude", Dimension::length, 0.0002, Range::positive());
+  const std::uint64_t seed = reader.seed("seed", 1);
+  Texture texture;
+  if (gaussian) {
+    reader.refuse({"wavelength"}, "by Gaussian noise, whose grain is the voxel");
+    constexpr double cut = 3.0;  // gaussian_noise cuts its deviates there
+    texture.highest = cut * amplitude;
+    if (!reader.failed()) texture.height = gaussian_noise(amplitude, seed);
+  } else {
+    const double wavelength = reader.quantity("wavelength", Dimension::length, 0.003, Range::positive());
+    texture.highest = amplitude;
+    if (!reader.failed()) texture.height = gradient_noise(amplitude, wavelength, seed);
+  }
+  ASPERITY_CHECK(reader.status());
+  implicit.take("texture", std::move(reader));
+  return texture;
+}
+
+Result<std::vector<MaterialBrush>> read_brushes(const SceneJson* json, ObjectReader& implicit) {
+  std::vector<MaterialBrush> brushes;
+  if (json == nullptr) return brushes;
+  constexpr std::size_t most = 10000;
+  if (!json->is_array()) {
+    implicit.fail_type("materials", *json, "an array of objects with centre, radius and a material");
+  } else if (json->empty() || json->size() > most) {
+    implicit.fail("materials", fmt::format("has {} entries", json->size()), fmt::format("1 to {}", most));
+  }
+  ASPERITY_CHECK(implicit.status());
+  SceneJson canonical = SceneJson::array();
+  for (std::size_t i = 0; i < json->size(); ++i) {
+    ObjectReader reader((*json)[i], fmt::format("{}[{}]", implicit.place_of("materials"), i), "material brush");
+    MaterialBrush brush;
+    if (!reader.failed() && !reader.has("centre")) reader.fail("centre", "is missing", "three lengths");
+    brush.centre = reader.lengths("centre", Vec3::Zero());
+    brush.radius = reader.quantity("radius", Dimension::length, 0.005, Range::positive());
+    brush.falloff = reader.quantity("falloff", Dimension::length, 0.0, Range{0.0, brush.radius});
+    const auto channel = [&](const char* key, float& value, const std::optional<double>& given) {
+      if (given) value = static_cast<float>(*given);
+      return reader.has(key);
+    };
+    const auto plain = [&](const char* key) {
+      return reader.has(key) ? std::optional<double>(reader.number(key, 0.0, Range::not_negative())) : std::nullopt;
+    };
+    bool any = channel("stiffness", brush.material.stiffness,
+                       reader.optional_quantity("stiffness", Dimension::stiffness, Range::positive()));
+    any = channel("damping", brush.material.damping,
+                  reader.optional_quantity("damping", Dimension::damping, Range::not_negative())) ||
+          any;
+    any = channel("static_friction", brush.material.static_friction, plain("static_friction")) || any;
+    any = channel("dynamic_friction", brush.material.dynamic_friction, plain("dynamic_friction")) || any;
+    any = channel("roughness", brush.material.roughness, plain("roughness")) || any;
+    if (!any && !reader.failed())
+      reader.fail("stiffness", "is missing, and so is every other property", "at least one property of a material");
+    ASPERITY_CHECK(reader.status());
+    canonical.push_back(reader.canonical());
+    brushes.push_back(brush);
+  }
+  implicit.write("materials", std::move(canonical));
+  return brushes;
+}
+
+/// A file's potential in metres, placed as its mesh is.
+Status place_source(SparseSource& source, double scale, const Vec3& centre) {
+  source.voxel *= scale;
+  source.origin = scale * (source.origin - centre);
+  source.outside *= scale;
+  source.inside *= scale;
+  for (SparseBlock& block : source.blocks) {
+    for (float& value : block.value) value = static_cast<float>(scale * static_cast<double>(value));
+  }
+  return success();
+}
+
+/// Bounds of the blocks with a point inside: what a level set without a mesh is fitted by.
+Box solid_bounds(const SparseSource& source) {
+  Box box;
+  for (const SparseBlock& block : source.blocks) {
+    for (int k = 0; k < SparseBlock::side; ++k) {
+      for (int j = 0; j < SparseBlock::side; ++j) {
+        for (int i = 0; i < SparseBlock::side; ++i) {
+          if (block.value[SparseBlock::index(i, j, k)] > 0.0F) continue;
+          const Vec3 node(SparseBlock::side * block.at[0] + i, SparseBlock::side * block.at[1] + j,
+                          SparseBlock::side * block.at[2] + k);
+          box.include(source.origin + source.voxel * node);
+        }
+      }
+    }
+  }
+  return box;
+}
+
+/// Reads one implicit surface.
+class ImplicitReader {
+ public:
+  ImplicitReader(ObjectReader& surface, ObjectReader& reader, const ImplicitFeel& feel, SceneContext& context)
+      : surface_(surface), reader_(reader), feel_(feel), context_(context) {}
+
+  Status read(Instance& instance) {
+    static const std::vector<std::string> sides{"auto", "front", "both"};
+    if (surface_.has("mesh")) ASPERITY_CHECK(read_mesh());
+    const std::string file = reader_.has("file") ? reader_.text("file", "") : std::string();
+    if (reader_.has("file") && file.empty()) reader_.fail("file", "is empty", "the name of a .vdb file");
+    if (!reader_.has("file")) reader_.refuse({"grid"}, "without a .vdb file");
+    if (mesh_ == nullptr && file.empty() && !surface_.failed())
+      surface_.fail("mesh", "is missing", "a mesh beside \"implicit\", or implicit.file with a .vdb file");
+    ASPERITY_CHECK(surface_.status());
+    ASPERITY_CHECK(reader_.status());
+    const SceneJson* noise = reader_.raw("texture");
+    Texture texture;
+    if (noise != nullptr && coat_) reader_.refuse({"texture"}, "beside a coat, which is the texture then");
+    ASPERITY_CHECK(reader_.status());
+    if (noise != nullptr) {
+      ASPERITY_TRY(texture, read_noise(*noise, reader_));
+    }
+    if (coat_) texture = {coat_height(*coat_, mesh_->mesh()), coat_->amplitude_bound()};
+    if (!texture.height) reader_.refuse({"redistance"}, "without a texture or a coat");
+    parts_.offset = reader_.quantity("offset", Dimension::length, 0.0, Range::not_negative());
+    parts_.reconstruction =
+        static_cast<CellReconstruction>(reader_.choice("reconstruction", reconstruction_names(), 1));
+    ASPERITY_TRY(const std::vector<MaterialBrush> brushes, read_brushes(reader_.raw("materials"), reader_));
+    for (std::size_t i = 0; i < brushes.size() && !texture.height; ++i) {
+      if (std::isnan(brushes[i].material.roughness)) continue;
+      reader_.fail(fmt::format("materials[{}].roughness", i), "multiplies a texture, and there is none",
+                   "a \"texture\" or a coat beside it");
+    }
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_CHECK(file.empty() ? convert(texture.highest) : load(file));
+    if (!brushes.empty()) ASPERITY_CHECK(paint(brushes));
+    if (texture.height) ASPERITY_CHECK(lay_texture(texture.height));
+    instance.name = surface_.text("name", name_);
+    instance.sides = surface_.choice("sides", sides, 0) == 2 ? Sides::both : Sides::front;
+    ASPERITY_CHECK(surface_.status());
+    parts_.mesh = mesh_;
+    Result<ImplicitSurface> built = ImplicitSurface::build(std::move(parts_));
+    if (!built) return place_error(std::move(built).error());
+    instance.surface = std::make_shared<const ImplicitSurface>(std::move(built).value());
+    surface_.take("implicit", std::move(reader_));
+    return success();
+  }
+
+ private:
+  Error place_error(Error error) const {
+    if (error.place.empty() || error.place == "implicit") {
+      error.place = surface_.place_of("implicit");
+    } else if (error.place.front() == '[') {
+      error.place = reader_.place_of("materials") + error.place;
+    } else {
+      error.place = reader_.place_of(error.place);
+    }
+    return error;
+  }
+  void note(const std::string& text) { context_.note(fmt::format("implicit \"{}\": {}", name_, text)); }
+
+  Status read_mesh() {
+    ASPERITY_TRY(MeshPart part, read_mesh_part(surface_, context_));
+    name_ = part.name;
+    scale_ = part.scale;
+    centre_ = part.centre;
+    turned_ = part.turned;
+    ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), surface_, context_));
+    if (context_.progress) context_.progress("building the search structure", 0.0);
+    mesh_ = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
+    if (const SceneJson* coat = surface_.raw("coat")) {
+      ASPERITY_TRY(ScenePart<Coat> read, read_coat(*coat, surface_.place_of("coat"), mesh_->mesh(), context_));
+      surface_.write("coat", std::move(read.canonical));
+      coat_ = std::make_unique<Coat>(std::move(read.value));
+    }
+    return success();
+  }
+
+  Status convert(double texture) {
+    Reach reach = reach_of(feel_, context_.device);
+    reach.outside += std::max(parts_.offset, feel_.probe_radius) + texture;
+    reach.inside += texture;
+    const Box& bounds = mesh_->mesh().bounds();
+    const ConversionSettings settings = read_conversion(reader_, bounds, reach);
+    ASPERITY_CHECK(reader_.status());
+    Result<ConvertedMesh> converted = convert_mesh(mesh_->index(), settings, context_.progress);
+    if (!converted) return place_error(std::move(converted).error());
+    const ConversionReport& report = converted->report;
+    for (const std::string& text : report.notes) note(text);
+    // A budget is met by a voxel, which then stands for it.
+    // In one order, whether they were given or chosen.
+    for (const char* key : {"budget", "band_outside", "band_inside", "inside", "shell_thickness"})
+      reader_.canonical().erase(key);
+    if (settings.budget_bytes > 0) reader_.write("voxel", report.voxel);
+    reader_.write("band_outside", converted->grid.outside());
+    const bool all = !std::isfinite(settings.band_inside);
+    reader_.write("band_inside", all ? SceneJson("all") : SceneJson(-converted->grid.inside()));
+    reader_.write("inside", to_string(report.rule));
+    if (report.rule == InsideRule::shell) reader_.write("shell_thickness", report.shell_thickness);
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(converted).value().grid);
+    return success();
+  }
+
+  Status load(const std::string& file) {
+    reader_.refuse({"voxel", "resolution", "budget", "band_outside", "band_inside", "inside", "shell_thickness"},
+                   "with a .vdb file, which has its own");
+    if (turned_) surface_.fail("up", "turns the mesh and not the .vdb file", "y beside implicit.file");
+    const std::string grid = reader_.text("grid", "");
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_CHECK(surface_.status());
+    const std::filesystem::path path = context_.resolve(file);
+    reader_.write("file", path.string());
+    Result<SparseFile> read = read_sparse(path, {grid}, context_.progress);
+    if (!read) return std::move(read).error().in_file(path.string());
+    if (name_.empty()) name_ = path.stem().string();
+    for (const std::string& text : read->notes) note(text);
+    reader_.write("grid", read->grid);
+    if (mesh_ == nullptr) {
+      const bool stated = surface_.has("units") || surface_.has("fit");
+      const double unit = read_units(surface_, true);
+      const double size = read_fit(surface_, !stated, context_);
+      ASPERITY_CHECK(surface_.status());
+      const Box bounds = solid_bounds(read->source);
+      const double largest = bounds.empty() ? 0.0 : unit * bounds.extent().maxCoeff();
+      const bool fitted = size > 0.0 && largest > 0.0;
+      scale_ = unit * (fitted ? size / largest : 1.0);
+      if (fitted) centre_ = bounds.centre();
+      if (fitted && !stated) {
+        note(fmt::format("scaled by {:.4g} to a largest side of {} (\"units\" or \"fit\" choose otherwise)", scale_,
+                         format_length(size)));
+      }
+    } else if (read->has_faces && read->mesh_faces != mesh_->mesh().triangles().size()) {
+      return Error{ErrorCode::mismatch,
+                   fmt::format("was made from a mesh of {} triangles, and \"{}\" has {}", read->mesh_faces, name_,
+                               mesh_->mesh().triangles().size()),
+                   path.string(), reader_.place_of("file"), "the mesh that it was made from"};
+    }
+    ASPERITY_CHECK(place_source(read->source, scale_, centre_));
+    Result<SparseGrid> built = SparseGrid::build(std::move(read->source));
+    if (!built) return std::move(built).error().in_file(path.string());
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(built).value());
+    return success();
+  }
+
+  Status paint(const std::vector<MaterialBrush>& brushes) {
+    const Material& own = feel_.material;
+    PointMaterial point;
+    point.stiffness = static_cast<float>(own.stiffness);
+    point.damping = static_cast<float>(own.damping);
+    point.static_friction = static_cast<float>(own.static_friction);
+    point.dynamic_friction = static_cast<float>(own.dynamic_friction);
+    point.roughness = 1.0F;
+    Result<SparseGrid> grid = painted(*parts_.grid, brushes, point);
+    if (!grid) return place_error(std::move(grid).error());
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(grid).value());
+    return success();
+  }
+
+  Status lay_texture(const PointHeight& height) {
+    const auto mode = static_cast<Redistancing>(
+        reader_.choice("redistance", redistancing_names(), static_cast<std::size_t>(Redistancing::redistanced)));
+    ASPERITY_CHECK(reader_.status());
+    if (context_.progress) context_.progress("laying the texture", 0.0);
+    Result<TexturedPotential> result = textured(*parts_.grid, height, mode, context_.progress);
+    if (!result) return place_error(std::move(result).error());
+    note(fmt::format("texture of {} to {}; {}: the potential is off a distance by at most {}, {} rms (before: {}, {})",
+                     format_length(result->lowest), format_length(result->highest), to_string(mode),
+                     format_length(result->largest_error), format_length(result->rms_error),
+                     format_length(result->largest_error_before), format_length(result->rms_error_before)));
+    parts_.untextured = parts_.grid;
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(result).value().grid);
+    return success();
+  }
+
+  ObjectReader& surface_;
+  ObjectReader& reader_;
+  const ImplicitFeel& feel_;
+  SceneContext& context_;
+  std::string name_;
+  std::shared_ptr<const MeshSurface> mesh_;
+  std::unique_ptr<Coat> coat_;
+  double scale_ = 1.0;
+  Vec3 centre_ = Vec3::Zero();
+  bool turned_ = false;
+  ImplicitParts parts_;
+};
+
+}  // namespace
+
+Status read_implicit(ObjectReader& surface, const ImplicitFeel& feel, SceneContext& context, Instance& instance) {
+  surface.refuse({"volume", "iso"}, "beside \"implicit\"");
+  surface.refuse({"search", "on_overlap", "shell_directions"}, "by an implicit surface");
+  if (!surface.has("mesh")) surface.refuse({"coat", "up"}, "without a mesh");
+  ASPERITY_CHECK(surface.status());
+  ObjectReader reader(*surface.raw("implicit"), surface.place_of("implicit"), "implicit");
+  ASPERITY_CHECK(reader.status());
+  return ImplicitReader(surface, reader, feel, context).read(instance);
+}
+
+}  // namespace asperity

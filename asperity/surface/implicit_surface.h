@@ -1,0 +1,72 @@
+#pragma once
+// Implicit surfaces made from meshes: a mesh for the eye, a signed potential for the hand (hybrid-surface-2004).
+
+#include <memory>
+
+#include "asperity/field/sparse_grid.h"
+#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/mesh_surface.h"
+
+namespace asperity {
+
+/// What an implicit surface is made of.
+struct ImplicitParts {
+  std::shared_ptr<const SparseGrid> grid;        ///< the potential that is felt
+  std::shared_ptr<const SparseGrid> untextured;  ///< the potential before its texture; nullptr: the same
+  std::shared_ptr<const MeshSurface> mesh;       ///< what it was made from; nullptr: a level set of another tool
+  CellReconstruction reconstruction = CellReconstruction::smooth;
+  /// What is felt is where the potential has this value (m): 0, or more to give thin objects some volume.
+  double offset = 0.0;
+};
+
+/// The zero set of a signed potential on a sparse grid. Its queries are those of the isosurface of the potential; laws
+/// that are made for potentials read the grid itself.
+class ImplicitSurface {
+ public:
+  /// Errors: bad_value (no grid, an offset outside the stored band, a potential that is nowhere zero, face indices
+  /// beyond the mesh). [build]
+  static Result<ImplicitSurface> build(ImplicitParts parts);
+
+  [[nodiscard]] const SparseGrid& grid() const noexcept { return *parts_.grid; }
+  [[nodiscard]] const std::shared_ptr<const SparseGrid>& shared_grid() const noexcept { return parts_.grid; }
+  /// The potential before its texture; `grid()` where there is none. [servo]
+  [[nodiscard]] const SparseGrid& untextured() const noexcept {
+    return parts_.untextured ? *parts_.untextured : *parts_.grid;
+  }
+  [[nodiscard]] bool textured() const noexcept { return parts_.untextured != nullptr; }
+  /// nullptr without a mesh. [servo]
+  [[nodiscard]] const MeshSurface* mesh() const noexcept { return parts_.mesh.get(); }
+  [[nodiscard]] const ImplicitParts& parts() const noexcept { return parts_; }
+  [[nodiscard]] double offset() const noexcept { return parts_.offset; }
+  /// The potential as an isosurface: what the proxy, avila and cross-uncross feel. [servo]
+  [[nodiscard]] const IsoSurface& iso() const noexcept { return iso_; }
+  /// How far outside and inside the potential can be trusted to rise and fall (m, both above 0): the stored band less
+  /// what reconstruction needs. [servo]
+  [[nodiscard]] double reach_outside() const noexcept { return parts_.grid->outside() - 2.0 * parts_.grid->voxel(); }
+  [[nodiscard]] double reach_inside() const noexcept { return -parts_.grid->inside() - 2.0 * parts_.grid->voxel(); }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+
+  // SurfaceQuery, by the isosurface.
+  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
+    return iso_.segment(motion, radius, sides, hint);
+  }
+  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept {
+    iso_.contacts(position, radius, sides, hint, out);
+  }
+  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept {
+    return iso_.closest(p, bound, hint);
+  }
+  /// The potential itself, less the offset. [servo]
+  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  [[nodiscard]] double skin() const noexcept { return iso_.skin(); }
+  [[nodiscard]] Box bounds() const noexcept { return iso_.bounds(); }
+
+ private:
+  ImplicitSurface(ImplicitParts parts, IsoSurface iso) : parts_(std::move(parts)), iso_(std::move(iso)) {}
+
+  ImplicitParts parts_;
+  IsoSurface iso_;
+};
+static_assert(SurfaceQuery<ImplicitSurface>);
+
+}  // namespace asperity

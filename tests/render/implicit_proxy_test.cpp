@@ -1,0 +1,231 @@
+// The proxy law on implicit surfaces: what it shares with isosurfaces is tested there, here what is theirs.
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/field/volumes.h"
+#include "tests/render/implicits.h"
+
+namespace asperity::testing {
+namespace {
+
+constexpr double degrees = 57.29577951308232;
+
+class ImplicitProxyEach : public ::testing::TestWithParam<CellReconstruction> {};
+INSTANTIATE_TEST_SUITE_P(Both, ImplicitProxyEach,
+                         ::testing::Values(CellReconstruction::trilinear, CellReconstruction::smooth));
+
+TEST_P(ImplicitProxyEach, ForceOnASphereIsThatOfTheSphere) {
+  const Scene scene =
+      Scene::build({implicit_instance(sparse_ball(0.0005, 0.003), ProxyLaw{}, GetParam())}, 0.0).value();
+  ProxyState state;
+  touch_at(scene, state, Vec3(0, 0, 0.032));
+  double sum = 0.0;
+  double off = 0.0;
+  const int ticks = 20000;
+  for (int i = 0; i < ticks; ++i) {
+    const double a = 5e-5 * i / 0.03;
+    const Vec3 p = 0.029 * Vec3(std::sin(a) * std::cos(0.4 * a), std::sin(a) * std::sin(0.4 * a), std::cos(a));
+    const ForceSample out = touch_at(scene, state, p);
+    ASSERT_TRUE(out.flags.has(TickFlag::contact));
+    sum += std::acos(std::min(1.0, out.wrench.force.normalized().dot(p.normalized()))) * degrees;
+    off += std::pow(out.proxy.norm() - 0.03, 2);
+  }
+  const bool smooth = GetParam() == CellReconstruction::smooth;
+  EXPECT_LT(sum / ticks, smooth ? 0.005 : 0.4);
+  EXPECT_LT(std::sqrt(off / ticks), smooth ? 0.1e-6 : 1.5e-6);
+}
+
+TEST_P(ImplicitProxyEach, ASlabOfHalfAMillimetreIsNeverPassedAtOneMetreASecond) {
+  // Voxels coarser than the slab is thick, and finer.
+  for (const double voxel : {0.00045, 0.0002}) {
+    const Scene scene =
+        Scene::build({implicit_instance(sparse_slab(0.0005, 0.01, voxel, 0.003), ProxyLaw{}, GetParam())}, 0.0).value();
+    std::mt19937_64 generator(4);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (int run = 0; run < 300; ++run) {
+      ProxyState state;
+      const Vec3 from(0.004 * unit(generator), 0.004 * unit(generator), 0.004);
+      const Vec3 direction = Vec3(0.5 * unit(generator), 0.5 * unit(generator), -1.0).normalized();
+      touch_at(scene, state, from);
+      // 1 mm a tick, on to 4 mm below the slab: longer than what it was ever pressed in.
+      for (int i = 1; i <= 8; ++i) {
+        const Vec3 p = from + 0.001 * i * direction;
+        const ForceSample out = touch_at(scene, state, p);
+        ASSERT_GT(out.proxy.z(), 0.0002) << run << " " << i;
+        if (p.z() < 0.0002) {
+          ASSERT_GT(out.wrench.force.z(), 0.0);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(ImplicitProxyEach, T5_no_motion_passes_at_any_speed) {
+  const auto grid =
+      sparse_grid([](const Vec3& p) { return torus_distance(p, 0.02, 0.006); }, cube(0.026), 0.0006, 0.003, 0.003);
+  const Scene scene = Scene::build({implicit_instance(grid, ProxyLaw{}, GetParam())}, 0.0).value();
+  std::mt19937_64 generator(5);
+  int contacts = 0;
+  ProxyState state;
+  Vec3 p(0.0, 0.0, 0.03);
+  touch_at(scene, state, p);
+  for (int i = 0; i < 60000; ++i) {
+    // 0.01 to 20 m/s at 1 kHz.
+    const double length = 1e-5 * std::pow(2000.0, std::uniform_real_distribution<double>(0.0, 1.0)(generator));
+    const Vec3 goal = random_point(generator, 0.03);
+    const Vec3 way = goal - p;
+    p += std::min(length, way.norm()) * way.normalized();
+    const ForceSample out = touch_at(scene, state, p);
+    contacts += out.flags.has(TickFlag::contact) ? 1 : 0;
+    SparseHint hint;
+    // Outside, or on the surface to within what interpolation rounds.
+    ASSERT_GT(grid->trilinear(out.proxy, hint).value, -3e-5) << i;
+  }
+  EXPECT_GT(contacts, 4000);
+}
+
+TEST(ImplicitProxy, T1_frictionless_loops_give_and_take_nothing) {
+  const Scene scene = Scene::build({implicit_instance(sparse_ball(0.0008, 0.003))}, 0.0).value();
+  for (int loop = 0; loop < 4; ++loop) {
+    ProxyState state;
+    const auto at = [&](double t) {
+      const double a = 2.0 * 3.14159265358979 * t;
+      const double depth = 0.001 + 0.0008 * std::sin(3.0 * a + loop);
+      return Vec3((0.03 - depth) *
+                  Vec3(0.6 * std::cos(a), 0.6 * std::sin(a), 0.7 + 0.2 * std::sin(2.0 * a)).normalized());
+    };
+    touch_at(scene, state, 1.2 * at(0.0));
+    Vec3 place = at(0.0);
+    Vec3 force = touch_at(scene, state, place).wrench.force;
+    double work = 0.0;
+    const int ticks = 40000;
+    for (int i = 1; i <= ticks; ++i) {
+      const Vec3 next = at(static_cast<double>(i) / ticks);
+      const Vec3 now = touch_at(scene, state, next).wrench.force;
+      work += 0.5 * (force + now).dot(next - place);
+      place = next;
+      force = now;
+    }
+    // 1e-6 k A, with the area that the loop encloses on the sphere.
+    EXPECT_LT(std::abs(work), 1e-6 * 1000.0 * 3.14 * 0.018 * 0.018) << loop;
+  }
+}
+
+TEST(ImplicitProxy, ABallRestsOnTheLevelOfItsRadius) {
+  const auto grid = sparse_box(0.0005, 0.004);
+  const Instance instance = implicit_instance(grid);
+  const double radius = 0.002;
+  const Scene scene = Scene::build({instance}, radius).value();
+  ProxyState state;
+  touch_at(scene, state, Vec3(0.0, 0.0, 0.03));
+  // On a face: the centre stays a radius off, the felt point is on the face.
+  ForceSample out = touch_at(scene, state, Vec3(0.004, 0.003, 0.021));
+  EXPECT_NEAR(out.proxy.z(), 0.022, 1e-6);
+  EXPECT_NEAR(out.wrench.force.z(), 1000.0 * 0.001, 1e-3);
+  EXPECT_NEAR(out.contact.point.z(), 0.02, 1e-6);
+  // Round an edge: a ball rolls over it, so that its centre is a radius away from the edge.
+  for (double t = 0.0; t <= 1.0; t += 0.02) {
+    const Vec3 p(0.015 + 0.0065 * t, 0.0, 0.0215 - 0.0065 * t * t);
+    out = touch_at(scene, state, p);
+    if (!out.flags.has(TickFlag::contact)) continue;
+    EXPECT_NEAR(box_distance(out.proxy, Vec3::Constant(0.02)), radius, 5e-5) << t;
+  }
+  // As the solve for balls on any isosurface does it, on the flat.
+  Instance both = instance;
+  both.sides = Sides::both;
+  const Scene general = Scene::build({both}, radius).value();
+  ProxyState other;
+  touch_at(general, other, Vec3(0.004, 0.003, 0.03));
+  ProxyState again;
+  touch_at(scene, again, Vec3(0.004, 0.003, 0.03));
+  for (int i = 0; i < 20; ++i) {
+    const Vec3 p(0.004 + 2e-5 * i, 0.003, 0.0215);
+    EXPECT_NEAR((touch_at(general, other, p).wrench.force - touch_at(scene, again, p).wrench.force).norm(), 0.0, 2e-3);
+  }
+}
+
+TEST(ImplicitProxy, AnOffsetGivesThinThingsVolume) {
+  const auto grid = sparse_slab(0.0005, 0.01, 0.0002, 0.003);
+  const Scene scene =
+      Scene::build({implicit_instance(grid, ProxyLaw{}, CellReconstruction::smooth, 0.001)}, 0.0).value();
+  ProxyState state;
+  touch_at(scene, state, Vec3(0, 0, 0.003));
+  const ForceSample out = touch_at(scene, state, Vec3(0, 0, 0.0005));
+  EXPECT_NEAR(out.proxy.z(), 0.00125, 1e-7);
+  EXPECT_NEAR(out.wrench.force.z(), 0.75, 1e-4);
+  const ImplicitParts parts{grid, nullptr, nullptr, CellReconstruction::smooth, 0.0028};
+  const Result<ImplicitSurface> too_far = ImplicitSurface::build(parts);
+  ASSERT_FALSE(too_far);
+  EXPECT_EQ(too_far.error().place, "offset");
+}
+
+/// A plate whose right half is four times as stiff and rough as its left, over a few voxels.
+std::shared_ptr<const SparseGrid> two_materials() {
+  SparseSource source = sparse_slab(0.01, 0.02, 0.0005, 0.003)->source();
+  for (SparseBlock& block : source.blocks) {
+    block.material.resize(SparseBlock::points);
+    for (int k = 0; k < 8; ++k) {
+      for (int j = 0; j < 8; ++j) {
+        for (int i = 0; i < 8; ++i) {
+          const double x = 0.0005 * (8 * block.at[0] + i);
+          const double share = std::clamp(0.5 + x / 0.002, 0.0, 1.0);
+          PointMaterial& m = block.material[SparseBlock::index(i, j, k)];
+          m.stiffness = static_cast<float>(250.0 + 750.0 * share);
+          m.static_friction = static_cast<float>(0.4 * share);
+          m.dynamic_friction = static_cast<float>(0.3 * share);
+        }
+      }
+    }
+  }
+  return std::make_shared<const SparseGrid>(SparseGrid::build(std::move(source)).value());
+}
+
+TEST(ImplicitProxy, MaterialsAreThoseOfTheContact) {
+  const Scene scene = Scene::build({implicit_instance(two_materials())}, 0.0).value();
+  for (const auto& [x, stiffness] : {std::pair{-0.008, 250.0}, std::pair{0.008, 1000.0}, std::pair{0.0, 625.0}}) {
+    ProxyState state;
+    touch_at(scene, state, Vec3(x, 0, 0.007));
+    const ForceSample out = touch_at(scene, state, Vec3(x, 0, 0.004));
+    EXPECT_NEAR(out.wrench.force.norm(), stiffness * 0.001, 1e-3) << x;
+  }
+  // Dragged along: the left half slips freely, the right half holds 0.3 of the push back.
+  for (const auto& [x, held] : {std::pair{-0.012, 0.0}, std::pair{0.008, 0.3}}) {
+    ProxyState state;
+    touch_at(scene, state, Vec3(x, 0, 0.007));
+    ForceSample out;
+    for (int i = 0; i < 200; ++i) out = touch_at(scene, state, Vec3(x + 2e-5 * i, 0, 0.004));
+    EXPECT_NEAR(-out.wrench.force.x() / out.wrench.force.z(), held, 1e-3) << x;
+  }
+}
+
+TEST(ImplicitProxy, T1_local_stiffness_gives_no_energy) {
+  const Scene scene = Scene::build({implicit_instance(two_materials())}, 0.0).value();
+  std::mt19937_64 generator(6);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int loop = 0; loop < 20; ++loop) {
+    ProxyState state;
+    const double depth = 0.0012;
+    const double phase = unit(generator);
+    const auto at = [&](double t) {
+      const double a = 6.283185307179586 * t;
+      return Vec3(0.004 * std::cos(a), 0.003 * std::sin(a + phase), 0.005 - depth - 0.001 * std::sin(a + 3.0 * phase));
+    };
+    touch_at(scene, state, at(0.0) + Vec3(0, 0, 0.01));
+    Vec3 place = at(0.0);
+    Vec3 force = touch_at(scene, state, place).wrench.force;
+    double work = 0.0;
+    for (int i = 1; i <= 3 * 5000; ++i) {
+      const Vec3 next = at(i / 5000.0);
+      const Vec3 now = touch_at(scene, state, next).wrench.force;
+      work += 0.5 * (force + now).dot(next - place);
+      place = next;
+      force = now;
+    }
+    EXPECT_LT(work, 1e-7) << loop;
+  }
+}
+
+}  // namespace
+}  // namespace asperity::testing

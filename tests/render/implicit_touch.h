@@ -1,0 +1,96 @@
+#pragma once
+// Laws that are felt on implicit surfaces, tick by tick.
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "asperity/render/law_forces.h"
+#include "tests/field/sparse_grids.h"
+#include "tests/render/fixtures.h"
+
+namespace asperity::implicit {
+
+inline std::shared_ptr<const ImplicitSurface> surface_of(std::shared_ptr<const SparseGrid> grid,
+                                                         CellReconstruction reconstruction = CellReconstruction::smooth,
+                                                         double offset = 0.0) {
+  ImplicitParts parts;
+  parts.grid = std::move(grid);
+  parts.reconstruction = reconstruction;
+  parts.offset = offset;
+  return std::make_shared<const ImplicitSurface>(test::must(ImplicitSurface::build(std::move(parts))));
+}
+
+/// As if nothing had been felt yet. What is left are caches.
+inline void forget(ContactState& state) {
+  state.iso = {};
+  state.seen_outside = false;
+  state.turn_budget = 0.0;
+}
+
+/// A probe and the law that it feels a surface by.
+template <class L>
+struct Touch {
+  std::shared_ptr<const ImplicitSurface> surface;
+  L law;
+  Material material{};
+  Seconds dt{1e-3};
+  ContactState state{};
+
+  LawForce at(const Vec3& p, const Vec3& velocity = Vec3::Zero()) {
+    if constexpr (std::is_same_v<L, MagneticLaw>) {
+      return magnetic_force(law, *surface, material, p, velocity, dt, state);
+    } else {
+      return virtual_contact_force(law, *surface, material, p, velocity, dt, state);
+    }
+  }
+};
+using PointTouch = Touch<VirtualContactPointLaw>;
+using MagnetTouch = Touch<MagneticLaw>;
+
+inline Vec3 far_outside() {
+  return Vec3(0.0, 0.0, 1.0);
+}
+
+/// Forces (N) along a path, after having been far outside.
+template <class L>
+std::vector<Vec3> forces_along(Touch<L>& touch, std::span<const Vec3> path) {
+  touch.at(far_outside());
+  std::vector<Vec3> forces;
+  for (const Vec3& p : path) forces.push_back(touch.at(p).force);
+  return forces;
+}
+
+/// Work on a hand that is led once around a closed path (J), trapezoid rule; from its highest point on, which is to be
+/// outside.
+template <class L>
+double loop_work(Touch<L>& touch, std::vector<Vec3> loop) {
+  const auto lower = [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); };
+  std::rotate(loop.begin(), std::max_element(loop.begin(), loop.end(), lower), loop.end());
+  const std::vector<Vec3> forces = forces_along(touch, loop);
+  double work = 0.0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const std::size_t next = (i + 1) % loop.size();
+    work += 0.5 * (forces[i] + forces[next]).dot(loop[next] - loop[i]);
+  }
+  return work;
+}
+
+/// Largest change of force between neighbouring places of a straight way (N).
+template <class L>
+double largest_jump_on(Touch<L> touch, const Vec3& from, const Vec3& to, double step) {
+  const int count = static_cast<int>(std::ceil((to - from).norm() / step));
+  return test::largest_jump(forces_along(touch, test::line(from, to, count)));
+}
+
+/// Angle between two directions (degrees).
+inline double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
+}
+
+}  // namespace asperity::implicit
