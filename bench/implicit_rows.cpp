@@ -79,7 +79,7 @@ Row sample_row(const std::string& name, const std::shared_ptr<const SparseGrid>&
     const Vec3 p = slide->probe(tick, 0.0);
     double sum = 0.0;
     for (int i = 0; i < samples; ++i) {
-      const Potential here = ((*grid).*sample)(p + Vec3(1e-5 * i, sum * 1e-12, 0.0), hint);
+      const Potential here = ((*grid).*sample)(p + Vec3(1e-5 * i, 0.0, 0.0), hint);
       sum += here.value + here.gradient.x();
     }
     return sum != 0.0;

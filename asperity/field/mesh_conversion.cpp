@@ -91,10 +91,12 @@ Result<Judgement> judge(const TriangleMesh& mesh, InsideRule wanted) {
   }
   if (out.rule == InsideRule::winding) return out;
   const double share = conversion::told_apart(*out.oriented, sampled_faces);
-  const std::string state = fmt::format(
-      "the mesh has {} boundary edges, {} edges of three or more faces and {} between faces that disagree; beside "
-      "{:.1f} % of its faces the winding number tells outside from inside",
-      report.boundary_edges, report.nonmanifold_edges, report.misoriented_edges, 100.0 * share);
+  std::string flaws = fmt::format("{} edges with one face only", report.boundary_edges);
+  if (report.nonmanifold_edges > 0) flaws += fmt::format(", {} with three or more", report.nonmanifold_edges);
+  if (report.misoriented_edges > 0) flaws += fmt::format(", {} between faces that disagree", report.misoriented_edges);
+  const std::string state =
+      fmt::format("the mesh has {}; beside {:.1f} % of its faces the winding number tells outside from inside", flaws,
+                  100.0 * share);
   if (share >= slightly_broken) {
     out.rule = InsideRule::winding;
     out.notes.push_back(state + ": inside is where it exceeds 1/2, which bridges the holes");
@@ -243,8 +245,9 @@ class Converter {
       ASPERITY_TRY(ConvertedMesh out, finished(std::move(*best)));
       const auto bytes = static_cast<double>(out.grid.memory_bytes());
       if (bytes <= budget) {
-        out.report.notes.push_back(fmt::format("a voxel of {:.6g} m takes {:.1f} of the {:.1f} MiB allowed",
-                                               out.report.voxel, bytes / 1048576.0, budget / 1048576.0));
+        out.report.notes.push_back(
+            fmt::format("a voxel of {:.6g} of the mesh's unit takes {:.1f} of the {:.1f} MiB allowed", out.report.voxel,
+                        bytes / 1048576.0, budget / 1048576.0));
         return out;
       }
       best.reset();
@@ -334,15 +337,15 @@ class Converter {
     report.largest_correction = largest_correction_;
     report.notes = judgement_.notes;
     if (judgement_.rule == InsideRule::shell)
-      report.notes.push_back(
-          fmt::format("the shell is {:.6g} m thick: the potential is the distance from the faces less half of that",
-                      attempt.thickness));
+      report.notes.push_back(fmt::format(
+          "the shell is {:.3g} voxels thick: the potential is the distance from the faces less half of that",
+          attempt.thickness / attempt.voxel));
     if (settings_.band_outside > 0.0 && settings_.band_outside < least_band * attempt.voxel)
       report.notes.push_back(
-          fmt::format("distances are stored {:.6g} m out: three voxels are the least", attempt.outside));
+          fmt::format("distances are stored {:.3g} voxels out: three are the least", attempt.outside / attempt.voxel));
     if (settings_.band_inside > 0.0 && settings_.band_inside < least_band * attempt.voxel)
       report.notes.push_back(
-          fmt::format("distances are stored {:.6g} m in: three voxels are the least", attempt.inside));
+          fmt::format("distances are stored {:.3g} voxels in: three are the least", attempt.inside / attempt.voxel));
     ASPERITY_TRY(SparseGrid grid, SparseGrid::build(std::move(source)));
     return ConvertedMesh{std::move(grid), std::move(report)};
   }

@@ -89,6 +89,8 @@ HermiteWeights hermite_weights(const GridAxis& axis, std::uint32_t cell) noexcep
           {0.0, -third * at_end[0], 1.0 - third * at_end[1], -third * at_end[2]}};
 }
 
+constexpr HermiteWeights even_weights{{-1.0 / 6.0, 1.0, 1.0 / 6.0, 0.0}, {0.0, 1.0 / 6.0, 1.0, -1.0 / 6.0}};
+
 /// Samples to coefficients along one axis, for 16 rows.
 template <int Stride, int RowA, int RowB>
 void to_bernstein(const HermiteWeights& w, double* c) noexcept {
@@ -137,6 +139,10 @@ void ScalarField::finish() {
     bounds_.lower[a] = finest[static_cast<std::size_t>(a)].front();
     bounds_.upper[a] = finest[static_cast<std::size_t>(a)].back();
   }
+  if (sparse_) {
+    per_cell_ = 1.0 / sparse_->voxel();
+    for (std::size_t a = 0; a < 3; ++a) last_cell_[static_cast<int>(a)] = sparse_axes_[a].cells() - 1.0;
+  }
   narrowest_ = std::min({finest[0].narrowest(), finest[1].narrowest(), finest[2].narrowest()});
   if (reconstruction_ == CellReconstruction::trilinear) return;
   // A coefficient is a weighted mean whose weights sum to 1 and may be below 0: by how much the sum of their sizes
@@ -167,7 +173,7 @@ std::size_t ScalarField::memory_bytes() const noexcept {
   return sizeof(*this) + grid_->memory_bytes() + octree_.memory_bytes();
 }
 
-CellIndex ScalarField::cell_of(int level, const Vec3& p) const noexcept {
+CellIndex ScalarField::grid_cell(int level, const Vec3& p) const noexcept {
   const GridAxes& a = axes(level);
   return {{a[0].locate(p.x()).cell, a[1].locate(p.y()).cell, a[2].locate(p.z()).cell}};
 }
@@ -237,7 +243,12 @@ bool ScalarField::gather(int level, const CellIndex& cell, CellPolynomial& out) 
 
 void ScalarField::convert(int level, const CellIndex& cell, CellPolynomial& out) const noexcept {
   const GridAxes& grid_axes = axes(level);
-  if (reconstruction_ == CellReconstruction::smooth) {
+  if (reconstruction_ == CellReconstruction::smooth && sparse_) {
+    // Evenly spaced, and constant where it ends.
+    to_bernstein<1, 4, 16>(even_weights, out.coefficient);
+    to_bernstein<4, 1, 16>(even_weights, out.coefficient);
+    to_bernstein<16, 1, 4>(even_weights, out.coefficient);
+  } else if (reconstruction_ == CellReconstruction::smooth) {
     to_bernstein<1, 4, 16>(hermite_weights(grid_axes[0], cell.at[0]), out.coefficient);
     to_bernstein<4, 1, 16>(hermite_weights(grid_axes[1], cell.at[1]), out.coefficient);
     to_bernstein<16, 1, 4>(hermite_weights(grid_axes[2], cell.at[2]), out.coefficient);

@@ -69,7 +69,17 @@ class ScalarField {
     return (p.array() >= bounds_.lower.array()).all() && (p.array() <= bounds_.upper.array()).all();
   }
   /// The cell that holds p (taken to the border where p is beyond it). [servo]
-  [[nodiscard]] CellIndex cell_of(int level, const Vec3& p) const noexcept;
+  [[nodiscard]] CellIndex cell_of(int level, const Vec3& p) const noexcept {
+    if (!sparse_) return grid_cell(level, p);
+    CellIndex cell;
+    for (int a = 0; a < 3; ++a) {
+      const double u = (p[a] - bounds_.lower[a]) * per_cell_;
+      // Not a number is taken to the border as well.
+      const double within = u > 0.0 ? (u < last_cell_[a] ? u : last_cell_[a]) : 0.0;
+      cell.at[a] = static_cast<std::uint32_t>(static_cast<std::int32_t>(within));
+    }
+    return cell;
+  }
   /// The field over a cell; keeps what `out` already holds when it is the same. False where its samples are not here
   /// or not numbers. [servo]
   bool load(int level, const CellIndex& cell, CellPolynomial& out) const noexcept;
@@ -92,6 +102,7 @@ class ScalarField {
   }
 
  private:
+  [[nodiscard]] CellIndex grid_cell(int level, const Vec3& p) const noexcept;
   void finish();
   void fetch_samples(const CellIndex& cell, double out[64]) const noexcept;
   /// Samples of a cell as the reconstruction needs them, 8 or 64. False where they are not here.
@@ -102,6 +113,8 @@ class ScalarField {
   std::unique_ptr<BrickStore> bricks_;
   std::shared_ptr<const SparseGrid> sparse_;
   GridAxes sparse_axes_;
+  double per_cell_ = 0.0;  ///< of the sparse grid (1/m)
+  Vec3 last_cell_ = Vec3::Zero();
   MinMaxOctree octree_;
   Box bounds_;
   CellReconstruction reconstruction_;

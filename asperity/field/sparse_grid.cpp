@@ -241,6 +241,7 @@ void SparseGrid::finish() {
       }
     }
   }
+  for (std::size_t a = 0; a < 3; ++a) extent_[static_cast<int>(a)] = static_cast<double>(brick_cells) * counts_[a];
   octree_ = MinMaxOctree::build(counts_, brick_cells, std::move(ranges));
 }
 
@@ -455,32 +456,36 @@ void SparseGrid::cell_samples(const std::uint32_t cell[3], int ring, double* out
   }
 }
 
-const SparseGrid::Brick* SparseGrid::locate(const Vec3& p, SparseHint& hint, double place[3]) const noexcept {
-  std::uint32_t at[3];
-  for (int a = 0; a < 3; ++a) {
-    const double u = (p[a] - lower_[a]) * per_voxel_;
-    const auto axis = static_cast<std::size_t>(a);
-    // Also false for what is not a number.
-    if (!(u >= 0.0 && u < static_cast<double>(counts_[axis]) * brick_cells)) {
-      hint.brick = outside_entry;
-      hint.owner = 0;
-      return nullptr;
-    }
-    at[axis] = static_cast<std::uint32_t>(u) / brick_cells;
-    place[a] = u - static_cast<double>(at[axis]) * brick_cells;
+const SparseGrid::Brick* SparseGrid::locate(const Vec3& p, SparseHint& hint, Place& place) const noexcept {
+  const double x = (p.x() - lower_.x()) * per_voxel_;
+  const double y = (p.y() - lower_.y()) * per_voxel_;
+  const double z = (p.z() - lower_.z()) * per_voxel_;
+  // Also false for what is not a number.
+  if (!(x >= 0.0 && y >= 0.0 && z >= 0.0 && x < extent_.x() && y < extent_.y() && z < extent_.z())) {
+    hint.owner = 0;
+    return nullptr;
   }
+  const auto i = static_cast<std::uint32_t>(static_cast<std::int32_t>(x));
+  const auto j = static_cast<std::uint32_t>(static_cast<std::int32_t>(y));
+  const auto k = static_cast<std::uint32_t>(static_cast<std::int32_t>(z));
+  place = {{i % brick_cells, j % brick_cells, k % brick_cells}, {x - i, y - j, z - k}};
+  const std::uint32_t at[3] = {i / brick_cells, j / brick_cells, k / brick_cells};
   if (hint.owner != identity_ || hint.at[0] != at[0] || hint.at[1] != at[1] || hint.at[2] != at[2]) {
     hint.owner = identity_;
     std::copy(at, at + 3, hint.at);
-    hint.brick = table_[table_index(at[0], at[1], at[2])];
+    const std::int32_t entry = table_[table_index(at[0], at[1], at[2])];
+    hint.brick = entry >= 0 ? bricks_[static_cast<std::size_t>(entry)].get() : nullptr;
   }
-  return hint.brick >= 0 ? bricks_[static_cast<std::size_t>(hint.brick)].get() : nullptr;
+  return static_cast<const Brick*>(hint.brick);
 }
 
 namespace {
 
-/// Value and gradient of the trilinear interpolant of eight corners, x fastest; `c` strided over a brick's values.
-Potential interpolated(const double c[8], double u, double v, double w, double per_voxel) noexcept {
+/// Value and gradient of the trilinear interpolant of eight corners, x fastest.
+inline Potential interpolated(const double c[8], const double at[3], double per_voxel) noexcept {
+  const double u = at[0];
+  const double v = at[1];
+  const double w = at[2];
   const double x00 = c[1] - c[0];
   const double x10 = c[3] - c[2];
   const double x01 = c[5] - c[4];
@@ -491,56 +496,55 @@ Potential interpolated(const double c[8], double u, double v, double w, double p
   const double y3 = c[6] + u * x11;
   const double low = y0 + v * (y1 - y0);
   const double high = y2 + v * (y3 - y2);
-  Potential out;
-  out.value = low + w * (high - low);
   const double gx_low = x00 + v * (x10 - x00);
   const double gx_high = x01 + v * (x11 - x01);
-  out.gradient = per_voxel * Vec3(gx_low + w * (gx_high - gx_low), (y1 - y0) + w * ((y3 - y2) - (y1 - y0)), high - low);
+  const double gy_low = y1 - y0;
+  Potential out;
+  out.value = low + w * (high - low);
+  out.gradient = Vec3(per_voxel * (gx_low + w * (gx_high - gx_low)), per_voxel * (gy_low + w * ((y3 - y2) - gy_low)),
+                      per_voxel * (high - low));
   return out;
 }
 
 }  // namespace
 
 Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept {
-  double place[3];
+  Place place;
   const Brick* brick = locate(p, hint, place);
-  if (brick == nullptr && hint.owner == 0) return {outside_, Vec3::Zero()};
-  const int i = static_cast<int>(place[0]);
-  const int j = static_cast<int>(place[1]);
-  const int k = static_cast<int>(place[2]);
   double c[8];
   if (brick != nullptr) {
-    const float* v = brick->value + apron_index(i, j, k);
+    const float* v = brick->value + apron_index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
+                                                static_cast<int>(place.cell[2]));
     constexpr int y = apron_side;
     constexpr int z = apron_side * apron_side;
     const float corners[8] = {v[0], v[1], v[y], v[y + 1], v[z], v[z + 1], v[z + y], v[z + y + 1]};
     for (int n = 0; n < 8; ++n) c[n] = static_cast<double>(corners[n]);
   } else {
-    const std::uint32_t cell[3] = {brick_cells * hint.at[0] + static_cast<std::uint32_t>(i),
-                                   brick_cells * hint.at[1] + static_cast<std::uint32_t>(j),
-                                   brick_cells * hint.at[2] + static_cast<std::uint32_t>(k)};
+    if (hint.owner == 0) return {outside_, Vec3::Zero()};
+    std::uint32_t cell[3];
+    cell_of(hint, place, cell);
     cell_samples(cell, 0, c);
   }
-  return interpolated(c, place[0] - i, place[1] - j, place[2] - k, per_voxel_);
+  return interpolated(c, place.fraction, per_voxel_);
 }
 
 Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
-  double place[3];
+  Place place;
   const Brick* brick = locate(p, hint, place);
-  if (brick == nullptr && hint.owner == 0) return {outside_, Vec3::Zero()};
-  const int at[3] = {static_cast<int>(place[0]), static_cast<int>(place[1]), static_cast<int>(place[2])};
   double c[64];
   if (brick != nullptr) {
     for (int k = 0; k < 4; ++k) {
       for (int j = 0; j < 4; ++j) {
-        const float* row = brick->value + apron_index(at[0] - 1, at[1] - 1 + j, at[2] - 1 + k);
+        const float* row =
+            brick->value + apron_index(static_cast<int>(place.cell[0]) - 1, static_cast<int>(place.cell[1]) - 1 + j,
+                                       static_cast<int>(place.cell[2]) - 1 + k);
         for (int i = 0; i < 4; ++i) c[i + 4 * (j + 4 * k)] = static_cast<double>(row[i]);
       }
     }
   } else {
-    const std::uint32_t cell[3] = {brick_cells * hint.at[0] + static_cast<std::uint32_t>(at[0]),
-                                   brick_cells * hint.at[1] + static_cast<std::uint32_t>(at[1]),
-                                   brick_cells * hint.at[2] + static_cast<std::uint32_t>(at[2])};
+    if (hint.owner == 0) return {outside_, Vec3::Zero()};
+    std::uint32_t cell[3];
+    cell_of(hint, place, cell);
     cell_samples(cell, 1, c);
   }
   Potential out;
@@ -548,7 +552,7 @@ Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noex
     const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
     double weight = 1.0;
     for (int a = 0; a < 3; ++a) {
-      const double f = place[a] - at[a];
+      const double f = place.fraction[a];
       weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
     }
     out.value += weight * c[node];
@@ -559,19 +563,18 @@ Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noex
 }
 
 std::uint32_t SparseGrid::face(const Vec3& p, SparseHint& hint) const noexcept {
-  double place[3];
+  Place place;
   // Half a voxel on, so that the cell's first node is the nearest one.
   const Brick* brick = locate(p + Vec3::Constant(0.5 * voxel_), hint, place);
   if (brick == nullptr || brick->face.empty()) return no_index;
-  return brick
-      ->face[SparseBlock::index(static_cast<int>(place[0]), static_cast<int>(place[1]), static_cast<int>(place[2]))];
+  return brick->face[SparseBlock::index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
+                                        static_cast<int>(place.cell[2]))];
 }
 
 PointMaterial SparseGrid::material(const Vec3& p, const PointMaterial& own, SparseHint& hint) const noexcept {
-  double place[3];
+  Place place;
   const Brick* brick = locate(p, hint, place);
   if (brick == nullptr || brick->material.empty()) return own;
-  const int at[3] = {static_cast<int>(place[0]), static_cast<int>(place[1]), static_cast<int>(place[2])};
   // The eight points' weights, and what they store.
   const PointMaterial* stored[8];
   double weights[8];
@@ -579,8 +582,8 @@ PointMaterial SparseGrid::material(const Vec3& p, const PointMaterial& own, Spar
     double weight = 1.0;
     int node[3];
     for (int a = 0; a < 3; ++a) {
-      const double f = place[a] - at[a];
-      node[a] = at[a] + (n >> a & 1);
+      const double f = place.fraction[a];
+      node[a] = static_cast<int>(place.cell[a]) + (n >> a & 1);
       weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
     }
     weights[n] = weight;

@@ -61,7 +61,7 @@ struct SparseSource {
 struct SparseHint {
   std::uint64_t owner = 0;  ///< identity of the grid; 0: nothing
   std::uint32_t at[3] = {no_index, no_index, no_index};
-  std::int32_t brick = -1;
+  const void* brick = nullptr;  ///< of the grid whose identity `owner` is; nullptr: none is stored there
 };
 
 /// Value and gradient of a potential.
@@ -142,8 +142,17 @@ class SparseGrid {
   [[nodiscard]] std::size_t table_index(std::uint32_t i, std::uint32_t j, std::uint32_t k) const noexcept {
     return i + static_cast<std::size_t>(counts_[0]) * (j + static_cast<std::size_t>(counts_[1]) * k);
   }
-  /// The brick of the cell that holds p and the place in it, 0 … 8 along each axis; nullptr beyond the band.
-  const Brick* locate(const Vec3& p, SparseHint& hint, double place[3]) const noexcept;
+  /// Where p is in its brick: cell along each axis, 0 … 7, and the fraction of it.
+  struct Place {
+    std::uint32_t cell[3];
+    double fraction[3];
+  };
+  /// The brick of the cell that holds p; nullptr where none is stored, then with hint.owner 0 beyond the bricks' box.
+  const Brick* locate(const Vec3& p, SparseHint& hint, Place& place) const noexcept;
+  /// Cell of the bricks' box that a place is in.
+  static void cell_of(const SparseHint& hint, const Place& place, std::uint32_t cell[3]) noexcept {
+    for (std::size_t a = 0; a < 3; ++a) cell[a] = brick_cells * hint.at[a] + place.cell[a];
+  }
   [[nodiscard]] float constant(std::int32_t entry) const noexcept {
     return static_cast<float>(entry == outside_entry ? outside_ : inside_);
   }
@@ -160,6 +169,7 @@ class SparseGrid {
   Vec3 lower_ = Vec3::Zero();
   std::array<std::int32_t, 3> first_{};  ///< block of the bricks' box's first corner
   std::array<std::uint32_t, 3> counts_{};
+  Vec3 extent_ = Vec3::Zero();  ///< of the bricks' box, in cells
   double outside_ = 0.0;
   double inside_ = 0.0;
   std::vector<std::int32_t> table_;  ///< brick, or outside_entry, inside_entry

@@ -88,20 +88,25 @@ LawForce force_at(const Instance& instance, const Material& material, const Vec3
 LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick,
                      Seconds dt, ContactState& slot) noexcept {
   const Pose& pose = instance.world_from_object;
-  const Vec3 velocity = pose.rotate_inverse(probe.twist.linear);
+  const bool at_origin = pose.is_identity();
+  const Vec3 velocity = at_origin ? probe.twist.linear : pose.rotate_inverse(probe.twist.linear);
   // A probe that enters within one tick was outside at the last one: ask there first.
   const IsoSurface* iso = iso_of(instance.surface);
   const bool fresh = iso != nullptr ? !slot.iso.started : !slot.seen_outside;
-  const Vec3 position = pose.apply_inverse(probe.pose.position);
-  const Material material = felt_material(instance, position, slot);
+  const Vec3 position = at_origin ? probe.pose.position : pose.apply_inverse(probe.pose.position);
+  // The contact point's laws look the material up where that is.
+  const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
+  const Material material = elsewhere ? instance.material : felt_material(instance, position, slot);
   if (fresh && !first_tick) force_at(instance, material, pose.apply_inverse(previous), velocity, dt, slot);
   LawForce law = force_at(instance, material, position, velocity, dt, slot);
   if (!law.contact) return law;
   if (iso != nullptr) law.element = element_at(instance, law.point, slot);
-  law.force = pose.rotate(law.force);
-  if (!law.damped) law.force = with_damping(law.force, pose.rotate(law.normal), probe.twist.linear, material.damping);
-  law.point = pose.apply(law.point);
-  law.normal = pose.rotate(law.normal);
+  if (!at_origin) {
+    law.force = pose.rotate(law.force);
+    law.point = pose.apply(law.point);
+    law.normal = pose.rotate(law.normal);
+  }
+  if (!law.damped) law.force = with_damping(law.force, law.normal, probe.twist.linear, material.damping);
   return law;
 }
 
