@@ -46,6 +46,7 @@ Rival parse_rival(const std::string& name) {
 std::vector<std::string> default_laws(const Scene& scene) {
   if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
   for (const Instance& instance : scene.instances()) {
+    if (std::holds_alternative<MagneticLaw>(instance.law)) return {"magnetic", "magnetic-literal", "proxy"};
     if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
       if (implicit->mesh() == nullptr)
         return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "avila"};
@@ -78,6 +79,11 @@ class Representations {
     for (const auto& [name, experiment] : made_) {
       if (name == kind) return experiment.get();
     }
+    for (const Instance& instance : plain_.scene.instances()) {
+      if (base_of(instance.surface) != nullptr) continue;
+      return Error{ErrorCode::bad_value, fmt::format("\"{}\" has no mesh to be felt as {}", instance.name, kind),
+                   plain_.name, "--laws", "laws without a kind, or a scene of meshes"};
+    }
     SceneArgument argument = options_.scene;
     argument.felt_as = kind;
     Result<Experiment> made = load_scene(argument, progress_, !options_.one_way);
@@ -92,18 +98,25 @@ class Representations {
   /// nothing implicit has a mesh.
   Result<const Scene*> exact(const std::vector<Rival>& rivals) {
     bool implicit = false;
+    bool textured = false;
     for (const Rival& rival : rivals) {
       ASPERITY_TRY(const Experiment* experiment, find(rival.kind));
       for (const Instance& instance : experiment->scene.instances()) {
         const ImplicitSurface* surface = implicit_of(instance.surface);
         if (surface == nullptr) continue;
-        if (surface->mesh() == nullptr) return nullptr;
+        // Noise, offsets and shells are no other representation's: each potential is its own measure.
+        if (surface->mesh() == nullptr || surface->offset() > 0.0 || surface->parts().shell_thickness > 0.0)
+          return nullptr;
+        textured = textured || surface->textured();
         implicit = true;
         reach_ = std::min(reach_, edge_reach_of(experiment->scene));
       }
     }
     if (!implicit) return nullptr;
     ASPERITY_TRY(const Experiment* relief, find("relief"));
+    for (const Instance& instance : relief->scene.instances()) {
+      if (textured && instance.surface.index() == 0) return nullptr;
+    }
     return &relief->scene;
   }
   /// From the edge: a law without a proxy feels where the probe is, as deep as it is pressed in.
@@ -125,11 +138,19 @@ class Representations {
   double reach_ = SeriesSettings{}.edge_reach;
 };
 
+/// The scene felt by a law: by its own, with its options, where that is the one.
+Result<Experiment> felt_by(const Experiment& experiment, const std::string& name) {
+  Result<Law> law = law_by_name(name);
+  if (!law) return std::move(law).error().at("--laws");
+  const auto instances = experiment.scene.instances();
+  if (std::all_of(instances.begin(), instances.end(), [&](const Instance& i) { return law_name(i.law) == name; }))
+    return experiment;
+  return with_law(experiment, *law);
+}
+
 Result<Column> run_law(const Experiment& experiment, const Rival& rival, const SeriesSettings& judged,
                        const Progress& progress) {
-  Result<Law> law = law_by_name(rival.law);
-  if (!law) return std::move(law).error().at("--laws");
-  ASPERITY_TRY(const Experiment changed, with_law(experiment, *law));
+  ASPERITY_TRY(const Experiment changed, felt_by(experiment, rival.law));
   ASPERITY_TRY(RunResult run, run_experiment(changed, {}, progress));
   Column column;
   column.entry.law = rival.name;
@@ -256,10 +277,8 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   // Every pair is checked before anything is run or written.
   Representations representations(options, experiment, progress);
   for (const Rival& rival : rivals) {
-    Result<Law> law = law_by_name(rival.law);
-    if (!law) return std::move(law).error().at("--laws");
     ASPERITY_TRY(const Experiment* felt, representations.find(rival.kind));
-    if (auto changed = with_law(*felt, *law); !changed) return std::move(changed).error();
+    if (auto changed = felt_by(*felt, rival.law); !changed) return std::move(changed).error();
   }
   ASPERITY_TRY(const Scene* exact, representations.exact(rivals));
   ASPERITY_CHECK(check_length(experiment));

@@ -265,7 +265,8 @@ CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
       ->group("Mesh");
   command->add_option("--band-outside", mesh.band_outside, "How far out distances are stored (3 voxels)")
       ->group("Mesh");
-  command->add_option("--band-inside", mesh.band_inside, "How far in, or all (3 voxels)")->group("Mesh");
+  command->add_option("--band-inside", mesh.band_inside, "How far in, or all (a tenth of the longest side)")
+      ->group("Mesh");
   command->add_option("--inside", mesh.inside, "What is inside: automatic, flood, winding, shell")->group("Mesh");
   command->add_option("--shell-thickness", mesh.shell_thickness, "Of the shell around open sheets (2 voxels)")
       ->group("Mesh");

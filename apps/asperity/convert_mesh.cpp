@@ -26,7 +26,7 @@ Result<double> length(const char* option, const std::string& text) {
   double value = 0.0;
   const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (problem != std::errc() || end != text.data() + text.size() || !(value > 0.0) || !std::isfinite(value))
-    return refused(option, text, "a number above 0, in the mesh file's unit");
+    return refused(option, text, "a plain number above 0: it is in the mesh file's own unit");
   return value;
 }
 
@@ -34,7 +34,8 @@ Result<std::size_t> bytes(const std::string& text) {
   if (text.empty()) return std::size_t{0};
   const std::size_t end = text.find_first_not_of("0123456789.");
   const Result<double> number = parse_quantity(text.substr(0, end), Dimension::ratio);
-  const std::string unit = end == std::string::npos ? "" : text.substr(text.find_first_not_of(' ', end));
+  const std::size_t letters = end == std::string::npos ? end : text.find_first_not_of(' ', end);
+  const std::string unit = letters == std::string::npos ? "" : text.substr(letters);
   const double factor = unit.empty() || unit == "B" ? 1.0
                         : unit == "kB"              ? 1e3
                         : unit == "MB"              ? 1e6
@@ -73,7 +74,12 @@ Result<ConversionSettings> settings_of(const MeshConversion& how) {
 
 Result<int> convert_mesh_file(const std::string& mesh_file, const std::string& vdb, const MeshConversion& how,
                               const Console& console) {
-  ASPERITY_TRY(const ConversionSettings settings, settings_of(how));
+  ASPERITY_TRY(ConversionSettings settings, settings_of(how));
+  const std::filesystem::path folder = std::filesystem::path(vdb).parent_path();
+  std::error_code ignored;
+  if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
+    return Error{
+        ErrorCode::file_unwritable, "cannot be created: its folder is not there", vdb, {}, "a folder that exists"};
   const auto begin = std::chrono::steady_clock::now();
   const Progress progress = console.progress();
   if (progress) progress("reading mesh", 0.0);
@@ -82,13 +88,15 @@ Result<int> convert_mesh_file(const std::string& mesh_file, const std::string& v
   Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source).value());
   if (!mesh) return std::move(mesh).error().in_file(mesh_file);
   for (const std::string& note : mesh->notes()) console.note(note);
+  // Deep enough for laws that read the potential at the probe.
+  constexpr double usual_depth = 0.1;
+  if (how.band_inside.empty()) settings.band_inside = usual_depth * mesh->bounds().extent().maxCoeff();
   const TriangleIndex index = TriangleIndex::build(std::move(mesh).value());
   Result<ConvertedMesh> made = convert_mesh(index, settings, progress);
   if (!made) return std::move(made).error().in_file(mesh_file);
   for (const std::string& note : made->report.notes) console.note(note);
   ASPERITY_CHECK(write_sparse(vdb, made->grid, index.mesh().triangles().size(), progress));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::error_code ignored;
   const auto size = static_cast<double>(std::filesystem::file_size(vdb, ignored));
   const SparseGrid& grid = made->grid;
   if (console.json) {

@@ -114,7 +114,7 @@ void potential_lines(const ImplicitSurface& surface, const Instance& instance, d
                   format_length(1.5 * voxel), format_length(6.0 * voxel)));
   if (constrains(instance.law)) return;
   const double depth = force / instance.material.stiffness;
-  if (depth > surface.reach_inside()) {
+  if (depth > surface.trusted_depth()) {
     lines.push_back(
         fmt::format("the stroke presses {} deep, and the potential is stored {} inside: from there on the "
                     "force no longer rises (implicit.band_inside)",

@@ -96,22 +96,27 @@ Result<Findings> inspect_scene(const InspectOptions& options, const Progress& pr
   return found;
 }
 
+/// What the file is as a scene of its own.
+void add_scene_facts(const Findings& scene, Findings& found) {
+  for (const ReportFact& fact : scene.facts) {
+    if (fact.name.starts_with("surface") || fact.name == "device")
+      found.facts.push_back({"as a scene: " + fact.name, fact.value});
+  }
+}
+
 /// A mesh alone: the file as it is, then what can be felt of it with the defaults.
 Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(MeshSource source, read_mesh(options.file));
   Findings found{"mesh", {}, {}, {}};
-  const std::vector<std::string> notes = source.notes;
   Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source));
   if (!mesh) return std::move(mesh).error().in_file(options.file);
   const Vec3 extent = mesh->bounds().extent();
-  found.fact("size", fmt::format("{:.4g} x {:.4g} x {:.4g} of the file's unit, which it does not state", extent.x(),
-                                 extent.y(), extent.z()));
+  found.fact("size", fmt::format("{:.4g} x {:.4g} x {:.4g} of the file's unit", extent.x(), extent.y(), extent.z()));
   mesh_facts(*mesh, found);
-  for (const std::string& note : notes) found.problems.push_back(note);
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
-  for (const ReportFact& fact : scene.facts) {
-    if (fact.name.starts_with("surface") || fact.name == "device")
-      found.facts.push_back({"as a scene: " + fact.name, fact.value});
+  add_scene_facts(scene, found);
+  for (const std::string& note : scene.problems) {
+    if (note.starts_with("implicit")) found.problems.push_back(note);
   }
   found.felt = scene.felt;
   return found;
@@ -192,10 +197,7 @@ Result<Findings> inspect_volume(const InspectOptions& options, const Progress& p
   }
   found.fact("suggested threshold", fmt::format("{:.6g}", otsu_threshold(*grid)));
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
-  for (const ReportFact& fact : scene.facts) {
-    if (fact.name.starts_with("surface") || fact.name == "device")
-      found.facts.push_back({"as a scene: " + fact.name, fact.value});
-  }
+  add_scene_facts(scene, found);
   found.felt = scene.felt;
   return found;
 }
@@ -216,10 +218,7 @@ Result<Findings> inspect_sparse(const InspectOptions& options, const Progress& p
              file.channels.empty() ? std::string("none") : fmt::format("{}", fmt::join(file.channels, ", ")));
   for (const std::string& note : file.notes) found.problems.push_back(note);
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
-  for (const ReportFact& fact : scene.facts) {
-    if (fact.name.starts_with("surface") || fact.name == "device")
-      found.facts.push_back({"as a scene: " + fact.name, fact.value});
-  }
+  add_scene_facts(scene, found);
   found.felt = scene.felt;
   return found;
 }

@@ -137,7 +137,8 @@ void change_implicit(Json& surface, const SceneArgument& a) {
 /// Drops what another representation needs; law and its options are the caller's.
 void change_kind(Json& surface, const std::string& kind) {
   if (kind.empty() || !surface.is_object() || !surface.contains("mesh")) return;
-  surface.erase("law");
+  // The law of another representation has no meaning here.
+  if (kind != "implicit" || !surface.contains("implicit")) surface.erase("law");
   if (kind == "implicit") {
     for (const char* key : {"search", "on_overlap", "shell_directions"}) surface.erase(key);
     member(surface, "implicit");

@@ -35,10 +35,13 @@ struct Reach {
 
 Reach reach_of(const ImplicitFeel& feel, const DeviceProfile& device) {
   Reach reach;
-  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&feel.law)) reach.outside = contact->offset;
-  if (const auto* magnetic = std::get_if<MagneticLaw>(&feel.law)) reach.outside = magnetic->band;
+  // The proxy needs the surface's neighbourhood alone; but what is compared is one potential under several laws.
+  reach.outside = MagneticLaw{}.band;
+  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&feel.law))
+    reach.outside = std::max(reach.outside, contact->offset);
+  if (const auto* magnetic = std::get_if<MagneticLaw>(&feel.law))
+    reach.outside = std::max(reach.outside, magnetic->band);
   // Laws without a proxy read the potential where the probe is: half as deep again as the device's force presses it in.
-  // The proxy does not need that; but what is compared is one potential under several laws.
   constexpr double margin = 1.5;
   reach.inside = margin * device.max_force / feel.material.stiffness;
   return reach;
@@ -90,7 +93,8 @@ ConversionSettings read_conversion(ObjectReader& reader, const Box& bounds, cons
 
 struct Texture {
   PointHeight height;
-  double highest = 0.0;  ///< bound (m)
+  double highest = 0.0;     ///< bound (m)
+  double wavelength = 0.0;  ///< m; 0: not stated
 };
 
 /// Noise. Nothing is read where there is no texture.
@@ -109,6 +113,7 @@ Result<Texture> read_noise(const SceneJson& json, ObjectReader& implicit) {
   } else {
     const double wavelength = reader.quantity("wavelength", Dimension::length, 0.003, Range::positive());
     texture.highest = amplitude;
+    texture.wavelength = wavelength;
     if (!reader.failed()) texture.height = gradient_noise(amplitude, wavelength, seed);
   }
   ASPERITY_CHECK(reader.status());
@@ -226,6 +231,7 @@ class ImplicitReader {
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(file.empty() ? convert(texture.highest) : load(file));
     if (!brushes.empty()) ASPERITY_CHECK(paint(brushes));
+    shortest_ = texture.wavelength;
     if (texture.height) ASPERITY_CHECK(lay_texture(texture.height));
     instance.name = surface_.text("name", name_);
     instance.sides = surface_.choice("sides", sides, 0) == 2 ? Sides::both : Sides::front;
@@ -233,6 +239,7 @@ class ImplicitReader {
     parts_.mesh = mesh_;
     Result<ImplicitSurface> built = ImplicitSurface::build(std::move(parts_));
     if (!built) return place_error(std::move(built).error());
+    note_limits(*built, instance.sides);
     instance.surface = std::make_shared<const ImplicitSurface>(std::move(built).value());
     surface_.take("implicit", std::move(reader_));
     return success();
@@ -250,6 +257,20 @@ class ImplicitReader {
     return error;
   }
   void note(const std::string& text) { context_.note(fmt::format("implicit \"{}\": {}", name_, text)); }
+
+  /// What the law will not feel of it.
+  void note_limits(const ImplicitSurface& surface, Sides sides) {
+    if (constrains(feel_.law)) return;
+    const double depth = context_.device.max_force / feel_.material.stiffness;
+    if (surface.trusted_depth() < depth) {
+      note(
+          fmt::format("stored {} inside: the force of \"{}\" no longer rises from {} on, and {} presses {} deep "
+                      "(band_inside; --band-inside of asperity convert)",
+                      format_length(-surface.grid().inside()), law_name(feel_.law),
+                      format_length(surface.trusted_depth()), context_.device.name, format_length(depth)));
+    }
+    if (sides == Sides::both) note(fmt::format("\"{}\" is felt from the front alone", law_name(feel_.law)));
+  }
 
   Status read_mesh() {
     ASPERITY_TRY(MeshPart part, read_mesh_part(surface_, context_));
@@ -289,6 +310,7 @@ class ImplicitReader {
     reader_.write("band_inside", all ? SceneJson("all") : SceneJson(-converted->grid.inside()));
     reader_.write("inside", to_string(report.rule));
     if (report.rule == InsideRule::shell) reader_.write("shell_thickness", report.shell_thickness);
+    parts_.shell_thickness = report.shell_thickness;
     parts_.grid = std::make_shared<const SparseGrid>(std::move(converted).value().grid);
     return success();
   }
@@ -359,6 +381,10 @@ class ImplicitReader {
                      format_length(result->lowest), format_length(result->highest), to_string(mode),
                      format_length(result->largest_error), format_length(result->rms_error),
                      format_length(result->largest_error_before), format_length(result->rms_error_before)));
+    if (shortest_ > 0.0 && shortest_ < 6.0 * parts_.grid->voxel()) {
+      note(fmt::format("a wavelength of {} is under six voxels of {}: it is felt weaker than asked for",
+                       format_length(shortest_), format_length(parts_.grid->voxel())));
+    }
     parts_.untextured = parts_.grid;
     parts_.grid = std::make_shared<const SparseGrid>(std::move(result).value().grid);
     return success();
@@ -374,6 +400,7 @@ class ImplicitReader {
   double scale_ = 1.0;
   Vec3 centre_ = Vec3::Zero();
   bool turned_ = false;
+  double shortest_ = 0.0;  ///< wavelength of the texture (m)
   ImplicitParts parts_;
 };
 

@@ -57,9 +57,6 @@ LawForce magnetic_force(const MagneticLaw& law, const ImplicitSurface& surface, 
 /// hybrid-surface-2004, Fig. 10a: the previous method. [servo]
 LawForce normal_perturbation_force(const ImplicitSurface& surface, const Material& material, const Vec3& probe,
                                    ContactState& state) noexcept;
-/// What the surface is made of at p (object frame): stored there, or the instance's own. [servo]
-Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept;
-
 /// The shell around a probe, as the consistent forms of Algorithms 1 and 2 need it.
 struct ShellContact {
   bool found = false;       ///< false: no surface

@@ -137,15 +137,9 @@ class ReliefProxy {
 
 }  // namespace
 
-Material felt_material(const Instance& instance, const Vec3& place, ContactState& state) noexcept {
-  const ImplicitSurface* implicit = implicit_of(instance.surface);
-  if (implicit == nullptr || !implicit->grid().has_materials()) return instance.material;
-  return material_at(*implicit, instance.material, place, state.hint.sparse);
-}
-
 Friction friction_of(const Instance& instance, const Material& material) noexcept {
   if (!std::holds_alternative<ProxyLaw>(instance.law)) return {};
-  return {material.static_friction, material.dynamic_friction};
+  return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction};
 }
 
 ProxyRest solve_on_relief(const ReliefSurface& surface, Sides sides, const Friction& friction, const Vec3& from,

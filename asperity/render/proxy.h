@@ -11,8 +11,6 @@ struct Friction {
   double still = 0.0;
   double sliding = 0.0;
 };
-/// What an instance is made of at a place of its surface (object frame): local where its points store that. [servo]
-Material felt_material(const Instance& instance, const Vec3& place, ContactState& state) noexcept;
 /// A material's coefficients; none unless the instance's law is the proxy. [servo]
 Friction friction_of(const Instance& instance, const Material& material) noexcept;
 

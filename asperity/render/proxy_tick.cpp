@@ -46,7 +46,7 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
   const Vec3 local_probe = at_origin ? position : pose.apply_inverse(position);
   // Friction is that of the place where the proxy rests.
   const Vec3& place = slot.touching ? slot.iso.point : local_from;
-  const Friction friction = friction_of(instance, felt_material(instance, place, slot));
+  const Friction friction = friction_of(instance, local_material(instance, place, slot.hint.sparse));
   const ReliefSurface* relief = proxied_relief(instance);
   const ProxyRest rest = relief != nullptr
                              ? solve_on_relief(*relief, instance.sides, friction, local_from, local_probe, slot)
@@ -58,7 +58,7 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
   LawForce law;
   Material material = instance.material;
   if (rest.contact) {
-    material = felt_material(instance, rest.proxy - radius * rest.normal, slot);
+    material = local_material(instance, rest.proxy - radius * rest.normal, slot.hint.sparse);
     law.contact = true;
     answer.proxy = at_origin ? rest.proxy : pose.apply(rest.proxy);
     law.normal = at_origin ? rest.normal : pose.rotate(rest.normal);
@@ -239,8 +239,8 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
     answer.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
     for (std::size_t i = 0; i < solver.size(); ++i) {
       const Instance& instance = solver.instance(i);
-      const Material material =
-          felt_material(instance, instance.world_from_object.apply_inverse(solution.proxy), solver.state(i));
+      const Material material = local_material(instance, instance.world_from_object.apply_inverse(solution.proxy),
+                                               solver.state(i).hint.sparse);
       LawForce law = owner_force(instance, material, i, solution, goal, probe);
       if (std::holds_alternative<ForceShadingLaw>(instance.law))
         add_turn(solver.state(i), law, position - state.previous_probe);
@@ -250,7 +250,7 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
   const auto friction_in = [&](auto& solver, std::uint32_t owner) {
     const Instance& instance = solver.instance(owner);
     const Vec3 place = instance.world_from_object.apply_inverse(before);
-    return friction_of(instance, felt_material(instance, place, solver.state(owner)));
+    return friction_of(instance, local_material(instance, place, solver.state(owner).hint.sparse));
   };
   if (smooth_slot == nullptr) {
     MeshConstraints constraints(scene.probe_radius());
@@ -306,17 +306,21 @@ Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
     Vec3 front;
     Foot foot;
     double skin = 0.0;
+    double least = 0.0;
     if (iso_of(instance.surface) != nullptr) {
       // A point in touch moves with its isosurface (update_felt); here is one that the scene newly has.
       if (slot.touching || slot.iso.field != 0) continue;
       const IsoSurface& iso = *iso_of(instance.surface);
       const IsoView view = iso.view_at(0, iso.threshold() + ball_level(instance, scene));
       FieldJet jet;
-      if (!view.sample(local, slot.hint.iso, jet) || view.sigma * (jet.value - view.threshold) >= 0.0) continue;
+      // A proxy that rested on the last scene's surface lies on this one's, or on either side of it by rounding.
+      least = 2.0 * view.skin();
+      if (!view.sample(local, slot.hint.iso, jet)) continue;
+      if (view.sigma * (jet.value - view.threshold) >= least * jet.gradient.norm()) continue;
       foot = view.closest(local, infinity, slot.hint.iso);
       if (!foot.found()) continue;
       front = view.outward(foot.point, slot.hint.iso);
-      skin = view.skin() - (ball_level(instance, scene) > 0.0 ? scene.probe_radius() : 0.0);
+      skin = 2.0 * least - (ball_level(instance, scene) > 0.0 ? scene.probe_radius() : 0.0);
     } else if (const ReliefSurface* relief = proxied_relief(instance)) {
       foot = relief->closest(local, infinity, slot.hint);
       if (!foot.found()) continue;
@@ -336,7 +340,7 @@ Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
       front = foot.normal;
       skin = patch.skin();
     }
-    if ((local - foot.point).dot(front) < 0.0) proxy = pose.apply(foot.point + (skin + scene.probe_radius()) * front);
+    if ((local - foot.point).dot(front) < least) proxy = pose.apply(foot.point + (skin + scene.probe_radius()) * front);
   }
   return proxy;
 }

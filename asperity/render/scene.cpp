@@ -59,6 +59,14 @@ Status check_potential(const Instance& instance, const std::string& place) {
                  place + ".law" + key,
                  fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside()))};
   }
+  if (std::holds_alternative<NormalPerturbationLaw>(instance.law) && surface.offset() > 0.0) {
+    return Error{ErrorCode::unsupported_pair,
+                 fmt::format("the law \"normal-perturbation\" touches the mesh itself, and \"{}\" has an offset of {}",
+                             instance.name, format_length(surface.offset())),
+                 {},
+                 place + ".law",
+                 "another law, or implicit.offset 0"};
+  }
   if (std::holds_alternative<NormalPerturbationLaw>(instance.law) &&
       (surface.mesh() == nullptr || !surface.textured())) {
     return Error{ErrorCode::unsupported_pair,
@@ -169,6 +177,35 @@ const IsoSurface* iso_of(const Surface& surface) noexcept {
   if (const ImplicitSurface* implicit = implicit_of(surface)) return &implicit->iso();
   const auto* iso = std::get_if<std::shared_ptr<const IsoSurface>>(&surface);
   return iso != nullptr ? iso->get() : nullptr;
+}
+
+Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept {
+  if (!surface.grid().has_materials()) return own;
+  PointMaterial mine;
+  mine.stiffness = static_cast<float>(own.stiffness);
+  mine.damping = static_cast<float>(own.damping);
+  mine.static_friction = static_cast<float>(own.static_friction);
+  mine.dynamic_friction = static_cast<float>(own.dynamic_friction);
+  mine.roughness = 1.0F;
+  const PointMaterial there = surface.grid().material(p, mine, hint);
+  Material out = own;
+  // What is the surface's own stays as exact as it is.
+  const auto take = [](float stored, float rounded, double& value) {
+    if (stored != rounded) value = static_cast<double>(stored);
+  };
+  take(there.stiffness, mine.stiffness, out.stiffness);
+  take(there.damping, mine.damping, out.damping);
+  take(there.static_friction, mine.static_friction, out.static_friction);
+  take(there.dynamic_friction, mine.dynamic_friction, out.dynamic_friction);
+  return out;
+}
+
+Material local_material(const Instance& instance, const Vec3& p, SparseHint& hint) noexcept {
+  const ImplicitSurface* implicit = implicit_of(instance.surface);
+  if (implicit == nullptr || !implicit->grid().has_materials()) return instance.material;
+  // A ball's centre, or a probe pressed in, is off the surface by what the potential says.
+  const Potential here = implicit->grid().trilinear(p, hint);
+  return material_at(*implicit, instance.material, p - here.value * here.gradient, hint);
 }
 
 const TriangleMesh& base_mesh(const Surface& surface) {

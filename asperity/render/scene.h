@@ -56,6 +56,11 @@ struct Instance {
   std::shared_ptr<const DenseMesh> dense;
 };
 
+/// What an implicit surface is made of at p (object frame): stored there, or the instance's own. [servo]
+Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept;
+/// What an instance is made of at the place of its surface nearest to p (object frame). [servo]
+Material local_material(const Instance& instance, const Vec3& p, SparseHint& hint) noexcept;
+
 /// Validated and immutable: `step` cannot fail on it. Copies share the surfaces.
 class Scene {
  public:

@@ -96,7 +96,7 @@ LawForce added_force(const Instance& instance, const ProbeSample& probe, const V
   const Vec3 position = at_origin ? probe.pose.position : pose.apply_inverse(probe.pose.position);
   // The contact point's laws look the material up where that is.
   const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
-  const Material material = elsewhere ? instance.material : felt_material(instance, position, slot);
+  const Material material = elsewhere ? instance.material : local_material(instance, position, slot.hint.sparse);
   if (fresh && !first_tick) force_at(instance, material, pose.apply_inverse(previous), velocity, dt, slot);
   LawForce law = force_at(instance, material, position, velocity, dt, slot);
   if (!law.contact) return law;
@@ -183,13 +183,35 @@ void add_effects(const Scene& scene, int level, const ProbeSample& probe, ForceS
   }
 }
 
-/// Of another scene nothing is known, except where the same volume is touched at another threshold.
+/// Of another scene nothing is known, except where the same volume is touched at another threshold or by another law,
+/// and that a law without a proxy has come in from the front.
 void forget_contacts(const Scene& scene, ProxyState& state) noexcept {
   for (std::size_t i = state.contacts.size(); i-- > 0;) {
-    const ContactState& slot = state.contacts[i];
-    const IsoSurface* iso =
-        slot.instance < scene.instances().size() ? iso_of(scene.instances()[slot.instance].surface) : nullptr;
-    if (iso == nullptr || iso->field().identity() != slot.iso.field) state.contacts.swap_remove(i);
+    ContactState& slot = state.contacts[i];
+    const Instance* instance = slot.instance < scene.instances().size() ? &scene.instances()[slot.instance] : nullptr;
+    const IsoSurface* iso = instance != nullptr ? iso_of(instance->surface) : nullptr;
+    if (iso == nullptr) {
+      state.contacts.swap_remove(i);
+      continue;
+    }
+    const bool same_law = slot.law == instance->law.index();
+    const bool same_field = iso->field().identity() == slot.iso.field;
+    if (same_law && same_field) continue;
+    const bool pushed = slot.touching && !constrains(instance->law);
+    if (!same_field && !(same_law && pushed)) {
+      state.contacts.swap_remove(i);
+      continue;
+    }
+    // What another law, or the law on another field, has left behind means nothing to this one.
+    ContactState fresh;
+    fresh.instance = slot.instance;
+    fresh.seen_outside = slot.seen_outside || slot.touching;
+    if (same_field) {
+      fresh.iso.field = slot.iso.field;
+      fresh.iso.threshold = slot.iso.threshold;
+      fresh.iso.level = slot.iso.level;
+    }
+    slot = fresh;
   }
 }
 
@@ -241,9 +263,13 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   if (!update_slots(scene, state, reach.grown(scene.probe_radius()))) tick.out.flags.set(TickFlag::contacts_dropped);
   const VolumeReading reading(scene);
   const int level = level_now(scene, state, probe, tick.out);
+  // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
+  const Vec3 held = state.proxy;
+  if (changed && state.stiffness > 0.0) state.proxy = reacquired(scene, state);
   bool moved = false;
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.instances()[slot.instance];
+    slot.law = instance.law.index();
     const IsoSurface* iso = iso_of(instance.surface);
     if (iso == nullptr) continue;
     const Pose& pose = instance.world_from_object;
@@ -252,9 +278,6 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
                         slot) ||
             moved;
   }
-  // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
-  const Vec3 held = state.proxy;
-  if (changed && state.stiffness > 0.0) state.proxy = reacquired(scene, state);
 
   Vec3 shadow = position;
   for (ContactState& slot : state.contacts) {

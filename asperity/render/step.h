@@ -26,6 +26,7 @@ struct IsoContact {
 /// What one probe remembers of one instance between ticks.
 struct ContactState {
   std::uint32_t instance = no_index;
+  std::size_t law = std::variant_npos;  ///< that the rest belongs to: index in Law
   Hint hint;
   /// Force laws without a proxy: the probe has been seen outside, so that being inside now means having come in from
   /// the front. False at the start and after leaving over a rim.

@@ -428,27 +428,6 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
 
 }  // namespace
 
-Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept {
-  if (!surface.grid().has_materials()) return own;
-  PointMaterial mine;
-  mine.stiffness = static_cast<float>(own.stiffness);
-  mine.damping = static_cast<float>(own.damping);
-  mine.static_friction = static_cast<float>(own.static_friction);
-  mine.dynamic_friction = static_cast<float>(own.dynamic_friction);
-  mine.roughness = 1.0F;
-  const PointMaterial there = surface.grid().material(p, mine, hint);
-  Material out = own;
-  // What is the surface's own stays as exact as it is.
-  const auto take = [](float stored, float rounded, double& value) {
-    if (stored != rounded) value = static_cast<double>(stored);
-  };
-  take(there.stiffness, mine.stiffness, out.stiffness);
-  take(there.damping, mine.damping, out.damping);
-  take(there.static_friction, mine.static_friction, out.static_friction);
-  take(there.dynamic_friction, mine.dynamic_friction, out.dynamic_friction);
-  return out;
-}
-
 LawForce virtual_contact_force(const VirtualContactPointLaw& law, const ImplicitSurface& surface,
                                const Material& material, const Vec3& probe, const Vec3& velocity, Seconds dt,
                                ContactState& state) noexcept {

@@ -62,7 +62,7 @@ Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direc
 /// The mesh that an implicit surface was made from is there to be seen; where what is felt differs, that is shown.
 Pixel first_hit(const ImplicitSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
                 Hint& hint) {
-  if (surface.mesh() != nullptr && !surface.textured() && surface.offset() == 0.0)
+  if (surface.is_mesh())
     return first_hit(*surface.mesh(), origin, direction, part, surface.mesh()->natural_sides(), hint);
   return first_hit(surface.iso(), origin, direction, part, sides, hint);
 }

@@ -102,16 +102,23 @@ class SeriesBuilder {
   RunSeries take() { return std::move(out_); }
 
  private:
-  /// An implicit surface without a texture is judged by the mesh that it was made from.
+  /// An implicit surface without texture, offset or shell is judged by the mesh that it was made from.
   static bool has_exact_mesh(const Surface& surface) {
     const ImplicitSurface* implicit = implicit_of(surface);
-    return implicit != nullptr && implicit->mesh() != nullptr && !implicit->textured() && implicit->offset() == 0.0;
+    return implicit != nullptr && implicit->is_mesh();
   }
 
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
     const std::uint32_t index = tick.rendered.contact.instance;
     const bool known = tick.rendered.flags.has(TickFlag::contact) && index < scene_.instances().size();
     return known ? &scene_.instances()[index] : nullptr;
+  }
+
+  /// Stiffness of what is touched, where it is touched (N/m).
+  double stiffness_at(const Instance& instance, const TraceRecord& tick) {
+    const ContactSummary& contact = tick.rendered.contact;
+    const Vec3 place = instance.world_from_object.apply_inverse(contact.point);
+    return local_material(instance, place, hints_[contact.instance].sparse).stiffness;
   }
 
   void add_energy(const TraceRecord& tick) {
@@ -123,7 +130,7 @@ class SeriesBuilder {
     out_.work.push_back(work_);
     const Instance* instance = touched(tick);
     const double depth = tick.rendered.contact.penetration;
-    double push = instance ? instance->material.stiffness * depth : 0.0;
+    double push = instance ? stiffness_at(*instance, tick) * depth : 0.0;
     // M1's layer is as stiff as the field is steep.
     if (instance && std::holds_alternative<AvilaLaw>(instance->law))
       push = std::max(0.0, tick.rendered.wrench.force.dot(tick.rendered.contact.normal));
@@ -155,7 +162,7 @@ class SeriesBuilder {
     const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
     out_.near_edge.back() = near_sharp_edge(base, felt - at.height * at.up) ? 1 : 0;
     in_shell(shape, felt, hint, at);
-    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / instance->material.stiffness, force);
+    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / stiffness_at(*instance, tick), force);
     add_direction(*instance, shape, at, force);
     if (const Coat* coat = coat_of(shape)) {
       const Vec3 along = pose.rotate_inverse(tangent);
@@ -192,7 +199,7 @@ class SeriesBuilder {
     const bool proxied = constrains(instance.law);
     const Vec3 felt = proxied
                           ? pose.apply_inverse(tick.rendered.proxy)
-                          : Vec3(pose.apply_inverse(tick.probe.pose.position) + force / instance.material.stiffness);
+                          : Vec3(pose.apply_inverse(tick.probe.pose.position) + force / stiffness_at(instance, tick));
     Hint& hint = hints_[tick.rendered.contact.instance];
     const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
     if (!foot.found()) return;
@@ -216,7 +223,7 @@ class SeriesBuilder {
     const BasePoint at = base_point(*surface.mesh(), felt, hint);
     if (at.face == no_index) return;
     const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
-    const double deflection = proxied ? 0.0 : force.dot(at.up) / instance.material.stiffness;
+    const double deflection = proxied ? 0.0 : force.dot(at.up) / stiffness_at(instance, tick);
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.segment({base + reach * at.up, base - reach * at.up}, 0.0, Sides::front, hint);

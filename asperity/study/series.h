@@ -55,7 +55,8 @@ struct RunSeries {
 /// What a run is judged by.
 struct SeriesSettings {
   /// Its surfaces stand for those of the run, one for one: what is felt through another representation is judged by the
-  /// exact geometry. nullptr: the run's own. An implicit surface without texture or offset is judged by its mesh.
+  /// exact geometry. nullptr: the run's own. An implicit surface without texture, offset or shell is judged by its
+  /// mesh.
   const Scene* exact = nullptr;
   double edge_reach = 0.001;  ///< m; edges that fold by 20 degrees or more count
 };

@@ -17,6 +17,8 @@ struct ImplicitParts {
   CellReconstruction reconstruction = CellReconstruction::smooth;
   /// What is felt is where the potential has this value (m): 0, or more to give thin objects some volume.
   double offset = 0.0;
+  /// Where the potential is the distance from an open mesh less half of this (m); 0: it is the mesh's own.
+  double shell_thickness = 0.0;
 };
 
 /// The zero set of a signed potential on a sparse grid. Its queries are those of the isosurface of the potential; laws
@@ -44,6 +46,15 @@ class ImplicitSurface {
   /// what reconstruction needs. [servo]
   [[nodiscard]] double reach_outside() const noexcept { return parts_.grid->outside() - 2.0 * parts_.grid->voxel(); }
   [[nodiscard]] double reach_inside() const noexcept { return -parts_.grid->inside() - 2.0 * parts_.grid->voxel(); }
+  /// How deep a law that reads the potential at the probe finds it rising (m): from there on the force is held.
+  [[nodiscard]] double trusted_depth() const noexcept {
+    const double reach = std::max(reach_inside(), 0.5 * parts_.grid->voxel());
+    return reach - std::min(parts_.grid->voxel(), 0.5 * reach);
+  }
+  /// Whether what is felt is the mesh itself: no texture, offset or shell. [any]
+  [[nodiscard]] bool is_mesh() const noexcept {
+    return mesh() != nullptr && !textured() && parts_.offset == 0.0 && parts_.shell_thickness == 0.0;
+  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
   // SurfaceQuery, by the isosurface.

@@ -88,6 +88,21 @@ TEST_F(ImplicitProgram, RepresentationsAreComparedByTheExactGeometry) {
   EXPECT_LT(proxy, 1e-4);
 }
 
+TEST_F(ImplicitProgram, TheScenesOwnLawKeepsItsOptions) {
+  ASSERT_EQ(
+      run("compare implicit-thin --no-report --out thin --laws virtual-contact-point,virtual-contact-point-literal"
+          " --json"),
+      0)
+      << read(".err");
+  const auto thin = nlohmann::json::parse(read(".out"));
+  // With the scene's offset 1 N is held; the other law has none, and the plate lets it through.
+  EXPECT_NEAR(thin["laws"][0]["metrics"]["force"]["max"].get<double>(), 1.0, 0.05);
+  EXPECT_LT(thin["laws"][1]["metrics"]["force"]["max"].get<double>(), 0.5);
+  ASSERT_EQ(run("compare implicit-texture --no-report --out texture --laws proxy --json"), 0) << read(".err");
+  const auto texture = nlohmann::json::parse(read(".out"));
+  EXPECT_LT(texture["laws"][0]["metrics"]["height"]["relative_error"].get<double>(), 0.01) << read(".out");
+}
+
 TEST_F(ImplicitProgram, WhatDoesNotGoTogetherIsRefused) {
   refused("convert ball.obj ball.vdb --resolution many", "--resolution");
   refused("convert ball.obj ball.vdb --voxel 1mm", "--voxel");
@@ -100,6 +115,8 @@ TEST_F(ImplicitProgram, WhatDoesNotGoTogetherIsRefused) {
   refused("touch ball.obj --implicit=40 --law god-object", "virtual-contact-point");
   refused("compare ball.obj --laws implicit/god-object", "god-object");
   refused("touch missing.vdb", "missing.vdb");
+  refused("compare probe.vdb --laws mesh/proxy", "no mesh");
+  refused("convert ball.obj ball.vdb --budget '5 '", "--budget");
   EXPECT_FALSE(fs::exists(folder_ / "ball.vdb"));
 }
 

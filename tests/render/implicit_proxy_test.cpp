@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "asperity/geometry/generators.h"
 #include "tests/field/volumes.h"
 #include "tests/render/implicits.h"
 
@@ -225,6 +226,116 @@ TEST(ImplicitProxy, T1_local_stiffness_gives_no_energy) {
     }
     EXPECT_LT(work, 1e-7) << loop;
   }
+}
+
+/// A place pressed 1 mm into the ball of 30 mm, and one above it.
+Vec3 pressed(std::mt19937_64& generator, double radius) {
+  return (0.029 + radius) * random_point(generator, 1.0).normalized();
+}
+
+TEST_P(ImplicitProxyEach, AnEditedCopyIsTouchedOnFromWhereTheProxyWas) {
+  std::mt19937_64 generator(7);
+  const auto grid = sparse_ball(0.0008, 0.006);
+  SparseSource raised = grid->source();
+  for (SparseBlock& block : raised.blocks) {
+    for (float& value : block.value) value -= 0.0003F;
+  }
+  for (const double radius : {0.0, 0.001}) {
+    const Scene scene = Scene::build({implicit_instance(grid, ProxyLaw{}, GetParam())}, radius).value();
+    const auto same = std::make_shared<const SparseGrid>(SparseGrid::build(grid->source()).value());
+    const auto higher = std::make_shared<const SparseGrid>(SparseGrid::build(raised).value());
+    const Scene again = Scene::build({implicit_instance(same, ProxyLaw{}, GetParam())}, radius).value();
+    const Scene edited = Scene::build({implicit_instance(higher, ProxyLaw{}, GetParam())}, radius).value();
+    for (int n = 0; n < 40; ++n) {
+      const Vec3 p = pressed(generator, radius);
+      ProxyState state;
+      touch_at(scene, state, 1.2 * p);
+      const Vec3 before = touch_at(scene, state, p).wrench.force;
+      ASSERT_NEAR(before.norm(), 1.0, 2e-2);
+      EXPECT_NEAR((touch_at(again, state, p).wrench.force - before).norm(), 0.0, 2e-2) << n << " " << radius;
+      // Raised: outside still, and no stronger than the spring's energy allows.
+      const ForceSample out = touch_at(edited, state, p);
+      EXPECT_GT(out.proxy.norm(), 0.0302 + radius) << n;
+      EXPECT_GT(out.wrench.force.norm(), 0.5) << n;
+      EXPECT_LT(out.wrench.force.norm(), 1.31) << n;
+    }
+  }
+}
+
+TEST(ImplicitProxy, LawsWithoutAProxyKeepPushingOnAnEditedCopy) {
+  const auto grid = sparse_ball(0.0008, 0.006);
+  const auto copy = std::make_shared<const SparseGrid>(SparseGrid::build(grid->source()).value());
+  for (const char* name : {"virtual-contact-point", "magnetic", "avila"}) {
+    const Law law = law_by_name(name).value();
+    const Scene scene = Scene::build({implicit_instance(grid, law)}, 0.0).value();
+    const Scene again = Scene::build({implicit_instance(copy, law)}, 0.0).value();
+    ProxyState state;
+    touch_at(scene, state, Vec3(0, 0, 0.035));
+    const Vec3 before = touch_at(scene, state, Vec3(0, 0, 0.0295)).wrench.force;
+    ASSERT_GT(before.z(), 0.3) << name;
+    EXPECT_NEAR((touch_at(again, state, Vec3(0, 0, 0.0295)).wrench.force - before).norm(), 0.0, 1e-6) << name;
+  }
+}
+
+TEST(ImplicitProxy, AnotherLawOnTheSameSurfaceStartsAfresh) {
+  const auto grid = sparse_ball(0.0008, 0.006);
+  const Instance first = implicit_instance(grid);
+  const char* names[] = {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "magnetic",
+                         "avila", "cross-uncross"};
+  for (const char* from : names) {
+    for (const char* to : names) {
+      Instance a = first;
+      a.law = law_by_name(from).value();
+      Instance b = first;
+      b.law = law_by_name(to).value();
+      const Scene before = Scene::build({a}, 0.0).value();
+      const Scene after = Scene::build({b}, 0.0).value();
+      ProxyState state;
+      touch_at(before, state, Vec3(0.001, 0, 0.035));
+      for (int i = 0; i < 5; ++i) touch_at(before, state, Vec3(0.001, 0, 0.0295));
+      // No harder than what presses, and right again after a new approach.
+      for (int i = 0; i < 5; ++i) {
+        EXPECT_LT(touch_at(after, state, Vec3(0.001, 0, 0.0295)).wrench.force.norm(), 0.6) << from << " " << to;
+      }
+      touch_at(after, state, Vec3(0.001, 0, 0.035));
+      const Vec3 force = touch_at(after, state, Vec3(0.001, 0, 0.0295)).wrench.force;
+      EXPECT_NEAR(force.norm(), 0.5, 0.05) << from << " " << to;
+    }
+  }
+}
+
+TEST(ImplicitProxy, ABallFeelsTheMaterialThatItTouches) {
+  // The material lies in a thin layer at the surface, where a ball's centre never is.
+  SparseSource source = sparse_slab(0.01, 0.02, 0.0005, 0.004)->source();
+  for (SparseBlock& block : source.blocks) {
+    block.material.resize(SparseBlock::points);
+    for (std::size_t n = 0; n < SparseBlock::points; ++n) {
+      if (std::abs(block.value[n]) < 0.00075F) block.material[n].stiffness = 200.0F;
+    }
+  }
+  const auto grid = std::make_shared<const SparseGrid>(SparseGrid::build(std::move(source)).value());
+  for (const Sides sides : {Sides::front, Sides::both}) {
+    Instance instance = implicit_instance(grid);
+    instance.sides = sides;
+    const Scene scene = Scene::build({instance}, 0.002).value();
+    ProxyState state;
+    touch_at(scene, state, Vec3(0, 0, 0.01));
+    EXPECT_NEAR(touch_at(scene, state, Vec3(0, 0, 0.006)).wrench.force.z(), 0.2, 5e-3);
+  }
+}
+
+TEST(ImplicitProxy, NormalPerturbationAndAnOffsetDoNotGoTogether) {
+  auto mesh = std::make_shared<const MeshSurface>(
+      TriangleIndex::build(TriangleMesh::build(box_mesh(Vec3::Constant(0.04))).value()));
+  const auto grid = sparse_box(0.0005, 0.004);
+  Instance instance = implicit_instance(grid);
+  instance.law = NormalPerturbationLaw{};
+  instance.surface = std::make_shared<const ImplicitSurface>(
+      ImplicitSurface::build({grid, grid, mesh, CellReconstruction::smooth, 0.001}).value());
+  const Result<Scene> scene = Scene::build({instance}, 0.0);
+  ASSERT_FALSE(scene.ok());
+  EXPECT_EQ(scene.error().code, ErrorCode::unsupported_pair);
+  EXPECT_NE(scene.error().accepted.find("offset"), std::string::npos);
 }
 
 }  // namespace

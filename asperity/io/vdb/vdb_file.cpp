@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 constexpr const char* distance_grid = "distance";
 constexpr const char* face_grid = "face";
 constexpr const char* faces_key = "asperity_mesh_faces";
-constexpr const char* unit_key = "asperity_unit";
 constexpr const char* outside_key = "asperity_band_outside";
 constexpr const char* inside_key = "asperity_band_inside";
 /// Of a leaf and what is made of it here.
@@ -140,7 +139,7 @@ class Reader {
       const std::string type = value_type(grid);
       const bool linear = !grid.linear.isZero(0.0);
       const double points = grid.number("file_voxel_count", 0.0);
-      out_.entries.push_back({grid.name, type.empty() ? grid.tree : type, class_of(grid),
+      out_.entries.push_back({shown(grid.name), shown(type.empty() ? grid.tree : type), class_of(grid),
                               linear ? (grid.linear.isDiagonal() ? grid.linear(0, 0) : grid.linear.col(0).norm()) : 0.0,
                               points > 0.0 && points < 1e18 ? static_cast<std::size_t>(points) : 0});
     }
@@ -456,7 +455,6 @@ std::string archived(const SparseGrid& grid, std::size_t mesh_faces) {
   openvdb::GridPtrVec grids;
   grids.push_back(distances_of(source));
   openvdb::GridBase& first = *grids.front();
-  first.insertMeta(unit_key, openvdb::StringMetadata("metre"));
   first.insertMeta(outside_key, openvdb::DoubleMetadata(source.outside));
   first.insertMeta(inside_key, openvdb::DoubleMetadata(source.inside));
   if (mesh_faces > 0) first.insertMeta(faces_key, openvdb::Int64Metadata(static_cast<openvdb::Int64>(mesh_faces)));
