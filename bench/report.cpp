@@ -157,7 +157,7 @@ std::string Report::text() const {
   for (const Ratio& ratio : ratios()) {
     text += fmt::format("{:<78}{:>6.2f}", ratio.what, ratio.value);
     if (ratio.bar > 0.0)
-      text += fmt::format("   owed: at most {:.1f}{}", ratio.bar, ratio.value <= ratio.bar ? "" : ", missed");
+      text += fmt::format("   owed: at most {:g}{}", ratio.bar, ratio.value <= ratio.bar ? "" : ", missed");
     text += '\n';
   }
   return text;

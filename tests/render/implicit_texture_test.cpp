@@ -59,7 +59,7 @@ double largest_change(const Scene& scene, double depth, double way) {
   return largest_jump(slide(scene, path_over_edge(depth, way), Vec3(0.013, 0.003, half + 0.002)));
 }
 
-TEST(ImplicitTexture, ForceOnACornerChangesWithTheStepAndNeverJumps) {
+TEST(ImplicitTexture, K_8_ForceOnACornerChangesWithTheStepAndNeverJumps) {
   const std::pair<const char*, PointHeight> textures[] = {{"waves", bumps(0.5 * voxel, 6.0 * voxel)},
                                                           {"gradient noise", gradient_noise(voxel, 6.0 * voxel, 4)}};
   for (const auto& [name, height] : textures) {

@@ -370,7 +370,7 @@ TEST(Textured, ModesAreNamed) {
 
 // --- K-8: what is felt of a wave ---
 
-TEST(Textured, RecoversAmplitudeWithinFivePerCentFromSixVoxelsOn) {
+TEST(Textured, K_8_RecoversAmplitudeWithinFivePerCentFromSixVoxelsOn) {
   const auto grid = plane(10.0 * voxel, 4.0 * voxel, 2.0 * voxel);
   const double amplitude = 0.5 * voxel;
   for (const double voxels : {6.0, 8.0, 12.0}) {

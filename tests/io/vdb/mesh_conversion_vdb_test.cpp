@@ -118,7 +118,7 @@ void expect_exact(const ConvertedMesh& converted, const TriangleMesh& mesh, cons
   }
 }
 
-TEST_F(MeshConversionVdb, SphereIsExactAndNearTheBallBySquareOfTheEdge) {
+TEST_F(MeshConversionVdb, K_1_SphereIsExactAndNearTheBallBySquareOfTheEdge) {
   double error[2] = {};
   for (const int level : {2, 3}) {
     const TriangleIndex index = index_of(icosphere(level, 0.05));
@@ -141,7 +141,7 @@ TEST_F(MeshConversionVdb, SphereIsExactAndNearTheBallBySquareOfTheEdge) {
   EXPECT_NEAR(error[0] / error[1], 4.0, 0.6);
 }
 
-TEST_F(MeshConversionVdb, BoxIsExactIntoItsInterior) {
+TEST_F(MeshConversionVdb, K_1_BoxIsExactIntoItsInterior) {
   const TriangleIndex index = index_of(box_mesh({0.08, 0.05, 0.03}));
   ConversionSettings settings = at_resolution(24);
   settings.band_inside = infinity;
@@ -154,7 +154,7 @@ TEST_F(MeshConversionVdb, BoxIsExactIntoItsInterior) {
   EXPECT_NEAR(converted->grid.trilinear(Vec3(0.0005, 0.0004, 0.0003), hint).value, -0.0147, converted->report.voxel);
 }
 
-TEST_F(MeshConversionVdb, TorusIsExactWithItsHoleOutside) {
+TEST_F(MeshConversionVdb, K_1_TorusIsExactWithItsHoleOutside) {
   const TriangleIndex index = index_of(torus_mesh(0.03, 0.012, 40, 20));
   ConversionSettings settings = at_resolution(32);
   settings.band_outside = 0.012;
@@ -367,7 +367,7 @@ TEST_F(MeshConversionVdb, TooMuchIsRefusedBeforeItIsMade) {
   EXPECT_EQ(converted.error().code, ErrorCode::too_large);
 }
 
-TEST_F(MeshConversionVdb, MemoryGrowsWithTheSurfaceNotTheVolume) {
+TEST_F(MeshConversionVdb, K_9_MemoryGrowsWithTheSurfaceNotTheVolume) {
   const TriangleIndex index = index_of(icosphere(4, 0.05));
   double bytes[3] = {};
   for (const int n : {0, 1, 2}) {
