@@ -176,17 +176,21 @@ Status place_source(SparseSource& source, double scale, const Vec3& centre) {
   return success();
 }
 
-/// Bounds of the blocks with a point inside: what a level set without a mesh is fitted by.
+/// Bounds of the inside, by what each point within says of its surroundings: what a level set without a mesh is fitted
+/// by.
 Box solid_bounds(const SparseSource& source) {
   Box box;
   for (const SparseBlock& block : source.blocks) {
     for (int k = 0; k < SparseBlock::side; ++k) {
       for (int j = 0; j < SparseBlock::side; ++j) {
         for (int i = 0; i < SparseBlock::side; ++i) {
-          if (block.value[SparseBlock::index(i, j, k)] > 0.0F) continue;
+          const auto value = static_cast<double>(block.value[SparseBlock::index(i, j, k)]);
+          if (value > 0.0) continue;
           const Vec3 node(SparseBlock::side * block.at[0] + i, SparseBlock::side * block.at[1] + j,
                           SparseBlock::side * block.at[2] + k);
-          box.include(source.origin + source.voxel * node);
+          const Vec3 p = source.origin + source.voxel * node;
+          box.include(p + Vec3::Constant(value));
+          box.include(p - Vec3::Constant(value));
         }
       }
     }

@@ -152,7 +152,7 @@ TEST_F(ImplicitScene, AFileIsReadInPlaceOfTheConversion) {
   // Fitted to another size, as other files are.
   const Experiment larger = good(R"({"surfaces":[{"implicit":{"file":"made.vdb"},"fit":"120 mm"}]})");
   EXPECT_NEAR(implicit(larger).grid().voxel(), 2.0 * implicit(made).grid().voxel(),
-              0.2 * implicit(made).grid().voxel());
+              0.02 * implicit(made).grid().voxel());
   // With another mesh beside it.
   const Error other_mesh = bad(R"({"surfaces":[{"mesh":"sheet.obj","implicit":{"file":"made.vdb"}}]})");
   EXPECT_EQ(other_mesh.code, ErrorCode::mismatch);
