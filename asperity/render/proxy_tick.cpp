@@ -211,6 +211,14 @@ void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, Prox
   state.stiffness = stiffness;
 }
 
+/// A little off the surface that a point was held on: from there a ball may roll (m, world).
+Vec3 off_the_surface(const Instance& instance, const ContactState& slot) noexcept {
+  const ReliefSurface* relief = proxied_relief(instance);
+  const Vec3 normal = relief != nullptr ? Vec3(slot.side * slot.point.normal()) : slot.iso.normal;
+  const double skin = relief != nullptr ? relief->skin() : proxied_iso(instance)->skin();
+  return 2.0 * skin * instance.world_from_object.rotate(normal);
+}
+
 }  // namespace
 
 ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held,
@@ -274,13 +282,7 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
       const Instance& instance = scene.instances()[slot.instance];
       if (!constrains(instance.law)) continue;
       joint.add(instance, slot);
-      if (slot.touching && smooth(instance)) {
-        // Held as a point until now: a little off the surface it may roll.
-        const ReliefSurface* relief = proxied_relief(instance);
-        const Vec3 normal = relief != nullptr ? Vec3(slot.side * slot.point.normal()) : slot.iso.normal;
-        const double skin = relief != nullptr ? relief->skin() : proxied_iso(instance)->skin();
-        from += 2.0 * skin * instance.world_from_object.rotate(normal);
-      }
+      if (slot.touching && smooth(instance)) from += off_the_surface(instance, slot);
       slot.touching = false;
     }
     bool clear = false;

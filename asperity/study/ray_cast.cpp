@@ -41,22 +41,23 @@ Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
   return inside;
 }
 
-/// First hit of a mesh, by the ray's parameter.
-Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
+/// First touch of a mesh or an isosurface by the ray's parameter, from the sides that can be touched.
+template <class S>
+Pixel first_touch(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
   const Segment motion{origin + part.from * direction, origin + part.to * direction};
   const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
   if (!hit.hit) return {};
   return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
 }
 
-/// First touch of an isosurface by the ray's parameter, from the sides that can be touched.
+Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
 Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
                 Hint& hint) {
-  const Segment motion{origin + part.from * direction, origin + part.to * direction};
-  const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
-  if (!hit.hit) return {};
-  return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
+  return first_touch(surface, origin, direction, part, sides, hint);
 }
 
 /// The mesh that an implicit surface was made from is there to be seen; where what is felt differs, that is shown.
