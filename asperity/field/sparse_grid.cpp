@@ -138,7 +138,7 @@ void SparseGrid::settle_signs(const std::vector<const SparseBlock*>& blocks) {
 }
 
 /// Makes the bricks of the wanted entries, aprons included.
-Status SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::vector<bool>& wanted) {
+void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::vector<bool>& wanted) {
   const auto step_y = static_cast<std::ptrdiff_t>(counts_[0]);
   const std::ptrdiff_t step_z = step_y * static_cast<std::ptrdiff_t>(counts_[1]);
   for (std::size_t entry = 0; entry < table_.size(); ++entry) {
@@ -192,7 +192,6 @@ Status SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std
     }
     bricks_[static_cast<std::size_t>(table_[entry])] = std::move(brick);
   }
-  return success();
 }
 
 void SparseGrid::finish() {
@@ -292,7 +291,7 @@ Result<SparseGrid> SparseGrid::build(SparseSource source) {
   }
   grid.settle_signs(blocks);
   grid.bricks_.resize(source.blocks.size());
-  ASPERITY_CHECK(grid.fill(blocks, std::vector<bool>(grid.table_.size(), true)));
+  grid.fill(blocks, std::vector<bool>(grid.table_.size(), true));
   grid.finish();
   return grid;
 }
@@ -379,7 +378,7 @@ Result<SparseGrid> SparseGrid::edited(std::vector<SparseBlock> changed) const {
     kept.push_back(block_of(entry));
     blocks[entry] = &kept.back();
   }
-  ASPERITY_CHECK(grid.fill(blocks, wanted));
+  grid.fill(blocks, wanted);
   grid.finish();
   return grid;
 }

@@ -126,10 +126,6 @@ class SparseGrid {
   /// Nodes of cell (i, j, k) of the bricks' box and, where `ring` is 1, those around them: 8 or 64 values, x fastest.
   /// [servo]
   void cell_samples(const std::uint32_t cell[3], int ring, double* out) const noexcept;
-  /// Whether a cell's brick is stored; the band's constants lie elsewhere. [servo]
-  [[nodiscard]] bool stored(const std::uint32_t cell[3]) const noexcept {
-    return table_[table_index(cell[0] / brick_cells, cell[1] / brick_cells, cell[2] / brick_cells)] >= 0;
-  }
 
  private:
   struct Brick {
@@ -157,7 +153,7 @@ class SparseGrid {
     return static_cast<float>(entry == outside_entry ? outside_ : inside_);
   }
   void settle_signs(const std::vector<const SparseBlock*>& blocks);
-  Status fill(const std::vector<const SparseBlock*>& blocks, const std::vector<bool>& wanted);
+  void fill(const std::vector<const SparseBlock*>& blocks, const std::vector<bool>& wanted);
   void finish();
   [[nodiscard]] SparseBlock block_of(std::size_t entry) const;
 

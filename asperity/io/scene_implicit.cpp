@@ -165,7 +165,7 @@ Result<std::vector<MaterialBrush>> read_brushes(const SceneJson* json, ObjectRea
 }
 
 /// A file's potential in metres, placed as its mesh is.
-Status place_source(SparseSource& source, double scale, const Vec3& centre) {
+void place_source(SparseSource& source, double scale, const Vec3& centre) {
   source.voxel *= scale;
   source.origin = scale * (source.origin - centre);
   source.outside *= scale;
@@ -173,7 +173,6 @@ Status place_source(SparseSource& source, double scale, const Vec3& centre) {
   for (SparseBlock& block : source.blocks) {
     for (float& value : block.value) value = static_cast<float>(scale * static_cast<double>(value));
   }
-  return success();
 }
 
 /// Bounds of the inside, by what each point within says of its surroundings: what a level set without a mesh is fitted
@@ -353,7 +352,7 @@ class ImplicitReader {
                                mesh_->mesh().triangles().size()),
                    path.string(), reader_.place_of("file"), "the mesh that it was made from"};
     }
-    ASPERITY_CHECK(place_source(read->source, scale_, centre_));
+    place_source(read->source, scale_, centre_);
     Result<SparseGrid> built = SparseGrid::build(std::move(read->source));
     if (!built) return std::move(built).error().in_file(path.string());
     parts_.grid = std::make_shared<const SparseGrid>(std::move(built).value());

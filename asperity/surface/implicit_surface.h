@@ -30,7 +30,6 @@ class ImplicitSurface {
   static Result<ImplicitSurface> build(ImplicitParts parts);
 
   [[nodiscard]] const SparseGrid& grid() const noexcept { return *parts_.grid; }
-  [[nodiscard]] const std::shared_ptr<const SparseGrid>& shared_grid() const noexcept { return parts_.grid; }
   /// The potential before its texture; `grid()` where there is none. [servo]
   [[nodiscard]] const SparseGrid& untextured() const noexcept {
     return parts_.untextured ? *parts_.untextured : *parts_.grid;

@@ -190,6 +190,31 @@ Scene potential_scene(const Law& law, CellReconstruction reconstruction, double 
   return Scene::build({instance}, probe_radius).value();
 }
 
+/// Slides in and out of a ball of 30 mm, through its middle now and then, with what is no number among the probes and
+/// states begun anew; `scene_at` tells what is felt at a tick.
+template <class SceneAt>
+void expect_clean(const char* name, int ticks, double radius, const SceneAt& scene_at) {
+  ProxyState state;
+  int touching = 0;
+  const Counts counts = trapped([&] {
+    for (int i = 0; i < ticks; ++i) {
+      const double s = i * 1e-3;
+      const double reach = i % 500 < 20 ? 0.04 : (i % 700 == 30 ? 0.0 : 0.0295 + 0.001 * std::sin(20.0 * s));
+      ProbeSample probe;
+      probe.pose.position = (reach + radius) * Vec3(std::cos(s), std::sin(1.7 * s), std::sin(s)).normalized();
+      probe.twist.linear = Vec3(0.01, 0.0, -0.02);
+      if (i % 333 == 332) probe.pose.position.x() = std::nan("");
+      if (i % 1000 == 999) state = ProxyState{};
+      touching += step(scene_at(i), state, probe, Seconds(1e-3)).flags.has(TickFlag::contact) ? 1 : 0;
+    }
+  });
+  EXPECT_GT(touching, ticks / 8) << name;
+  EXPECT_EQ(counts.allocations, 0) << name;
+  EXPECT_EQ(counts.locks, 0) << name;
+  EXPECT_EQ(counts.throws, 0) << name;
+  EXPECT_EQ(counts.files, 0) << name;
+}
+
 TEST(PotentialTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
 #if defined(ASPERITY_SANITIZED)
   GTEST_SKIP() << "sanitizers replace the same functions";
@@ -201,26 +226,7 @@ TEST(PotentialTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
       for (const double radius : {0.0, 0.002}) {
         if (radius > 0.0 && !constrains(law)) continue;
         const Scene scene = potential_scene(law, reconstruction, radius);
-        ProxyState state;
-        int touching = 0;
-        const int ticks = radius > 0.0 ? 300 : 4000;
-        const Counts counts = trapped([&] {
-          for (int i = 0; i < ticks; ++i) {
-            const double s = i * 1e-3;
-            const double reach = i % 500 < 20 ? 0.05 : (i % 700 == 30 ? 0.0 : 0.0295 + 0.001 * std::sin(20.0 * s));
-            ProbeSample probe;
-            probe.pose.position = (reach + radius) * Vec3(std::cos(s), std::sin(1.7 * s), std::sin(s)).normalized();
-            probe.twist.linear = Vec3(0.01, 0.0, -0.02);
-            if (i % 333 == 332) probe.pose.position.x() = std::nan("");
-            if (i % 1000 == 999) state = ProxyState{};
-            touching += step(scene, state, probe, Seconds(1e-3)).flags.has(TickFlag::contact) ? 1 : 0;
-          }
-        });
-        EXPECT_GT(touching, ticks / 8) << name;
-        EXPECT_EQ(counts.allocations, 0) << name;
-        EXPECT_EQ(counts.locks, 0) << name;
-        EXPECT_EQ(counts.throws, 0) << name;
-        EXPECT_EQ(counts.files, 0) << name;
+        expect_clean(name, radius > 0.0 ? 300 : 4000, radius, [&](int) -> const Scene& { return scene; });
       }
     }
   }
@@ -237,28 +243,9 @@ TEST(VolumeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
         if (radius > 0.0 && needs_field(law)) continue;
         const Scene scene = volume_scene(law, reconstruction, radius, 0.03);
         const Scene other = volume_scene(law, reconstruction, radius, 0.0305);
-        ProxyState state;
-        int touching = 0;
-        const int ticks = radius > 0.0 ? 150 : 4000;
-        const Counts counts = trapped([&] {
-          for (int i = 0; i < ticks; ++i) {
-            const double s = i * 1e-3;
-            const double reach = i % 500 < 20 ? 0.04 : (i % 700 == 30 ? 0.0 : 0.0295 + 0.001 * std::sin(20.0 * s));
-            ProbeSample probe;
-            probe.pose.position = (reach + radius) * Vec3(std::cos(s), std::sin(1.7 * s), std::sin(s)).normalized();
-            probe.twist.linear = Vec3(0.01, 0.0, -0.02);
-            if (i % 333 == 332) probe.pose.position.x() = std::nan("");
-            if (i % 1000 == 999) state = ProxyState{};
-            // The threshold changes under the probe now and then.
-            const Scene& felt = i % 400 < 200 ? scene : other;
-            touching += step(felt, state, probe, Seconds(1e-3)).flags.has(TickFlag::contact) ? 1 : 0;
-          }
-        });
-        EXPECT_GT(touching, ticks / 8) << name;
-        EXPECT_EQ(counts.allocations, 0) << name;
-        EXPECT_EQ(counts.locks, 0) << name;
-        EXPECT_EQ(counts.throws, 0) << name;
-        EXPECT_EQ(counts.files, 0) << name;
+        // The threshold changes under the probe now and then.
+        expect_clean(name, radius > 0.0 ? 150 : 4000, radius,
+                     [&](int i) -> const Scene& { return i % 400 < 200 ? scene : other; });
       }
     }
   }
