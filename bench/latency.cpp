@@ -37,6 +37,7 @@ Status measure_all(const Options& options, Report& report) {
   std::vector<int> reliefs = {0, 3, 5, 6, 8};
   std::vector<std::uint32_t> volumes = {32, 64, 128, 256, 512};
   std::vector<int> potentials = {3, 4, 5, 6, 8};
+  std::vector<int> fine = {5};
   int map_size = 1024;
   if (options.quick) {
     effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
@@ -51,6 +52,7 @@ Status measure_all(const Options& options, Report& report) {
   if (!asked("relief")) reliefs.clear();
   if (!asked("volume")) volumes.clear();
   if (!asked("potential")) potentials.clear();
+  if (!asked("fine")) fine.clear();
   for (const int subdivisions : meshes) {
     say(fmt::format("icosphere of {} triangles", 20 << (2 * subdivisions)));
     ASPERITY_TRY(Group group, measure_mesh(subdivisions, effort, report.clock_cost));
@@ -69,6 +71,11 @@ Status measure_all(const Options& options, Report& report) {
   for (const int subdivisions : potentials) {
     say(fmt::format("potential of {} triangles", 20 << (2 * subdivisions)));
     ASPERITY_TRY(Group group, measure_potential(subdivisions, effort, report.clock_cost));
+    report.groups.push_back(std::move(group));
+  }
+  for (const int subdivisions : fine) {
+    say(fmt::format("texture and friction on {} triangles", 20 << (2 * subdivisions)));
+    ASPERITY_TRY(Group group, measure_fine(subdivisions, effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
   say("");
@@ -105,8 +112,8 @@ int main(int argc, char** argv) {
     app.add_flag("--check", options.check,
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
-    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume or potential")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential"}));
+    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential or fine")
+        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine"}));
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();

@@ -23,11 +23,13 @@ inline constexpr const char* proxy_cosine = "proxy, cosine, UVs";
 inline constexpr const char* proxy_inside = "proxy, per face, inside a face";
 inline constexpr const char* proxy_edge = "proxy, per face, along an edge";
 
+inline constexpr const char* bare_contact = "contact alone, no friction";
+
 inline constexpr const char* contact_point_friction = "virtual contact point, friction, smooth";
 
 /// What was measured on one mesh.
 struct Group {
-  std::string kind;  ///< "mesh", "relief", "volume" or "potential"
+  std::string kind;  ///< "mesh", "relief", "volume", "potential" or "fine"
   std::size_t triangles = 0;
   std::uint32_t resolution = 0;       ///< of a volume: samples along each axis
   double mesh_build_seconds = 0.0;    ///< welding, checks, adjacency, normals
@@ -59,5 +61,9 @@ Result<Group> measure_volume(std::uint32_t count, const Effort& effort, double c
 /// The same mesh as a potential on voxels of 0.78 mm, 128 across, whatever the count of its triangles: the virtual
 /// contact point with and without friction and as printed, the proxy law, and the sampling alone. [build]
 Result<Group> measure_potential(int subdivisions, const Effort& effort, double clock_cost);
+
+/// The same mesh felt by its proxy alone, and with friction and texture as forces of their own on top: what they cost
+/// is the difference of the medians. [build]
+Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 
+#include "apps/asperity/rival.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
 #include "asperity/io/atomic_file.h"
@@ -24,42 +25,6 @@ struct CompareOptions {
   bool no_report = false;
   bool one_way = false;
 };
-
-/// Surface kinds that a law's name may start with.
-constexpr const char* kinds[] = {"mesh", "relief", "implicit"};
-
-/// "implicit/proxy": a law, and what the meshes of the scene are felt through; without a kind, as the scene has them.
-struct Rival {
-  std::string name;
-  std::string kind;
-  std::string law;
-};
-
-Rival parse_rival(const std::string& name) {
-  for (const char* kind : kinds) {
-    const std::string prefix = std::string(kind) + "/";
-    if (name.starts_with(prefix)) return {name, kind, name.substr(prefix.size())};
-  }
-  return {name, {}, name};
-}
-
-std::vector<std::string> default_laws(const Scene& scene) {
-  if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
-  for (const Instance& instance : scene.instances()) {
-    if (std::holds_alternative<MagneticLaw>(instance.law)) return {"magnetic", "magnetic-literal", "proxy"};
-    if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
-      if (implicit->mesh() == nullptr)
-        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "avila"};
-      if (implicit->textured())
-        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "normal-perturbation"};
-      return {
-          "mesh/proxy", "mesh/force-shading-literal", "proxy", "virtual-contact-point", "virtual-contact-point-literal",
-          "avila"};
-    }
-    if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
-  }
-  return {"proxy", "mesostructure", "height-field", "force-shading"};
-}
 
 /// A law run on the scene, with what a table shows of it.
 struct Column {
@@ -138,19 +103,9 @@ class Representations {
   double reach_ = SeriesSettings{}.edge_reach;
 };
 
-/// The scene felt by a law: by its own, with its options, where that is the one.
-Result<Experiment> felt_by(const Experiment& experiment, const std::string& name) {
-  Result<Law> law = law_by_name(name);
-  if (!law) return std::move(law).error().at("--laws");
-  const auto instances = experiment.scene.instances();
-  if (std::all_of(instances.begin(), instances.end(), [&](const Instance& i) { return law_name(i.law) == name; }))
-    return experiment;
-  return with_law(experiment, *law);
-}
-
 Result<Column> run_law(const Experiment& experiment, const Rival& rival, const SeriesSettings& judged,
                        const Progress& progress) {
-  ASPERITY_TRY(const Experiment changed, felt_by(experiment, rival.law));
+  ASPERITY_TRY(const Experiment changed, felt_by(experiment, rival));
   ASPERITY_TRY(RunResult run, run_experiment(changed, {}, progress));
   Column column;
   column.entry.law = rival.name;
@@ -242,7 +197,10 @@ Result<std::vector<LoopRateRow>> rates_of(const Experiment& experiment, const st
   if (followed_instance(experiment.scene) == nullptr) return std::vector<LoopRateRow>{};
   if (progress) progress("measuring the loop rate", 0.0);
   std::vector<Law> felt;
-  for (const Rival& rival : rivals) felt.push_back(law_by_name(rival.law).value());
+  for (const Rival& rival : rivals) {
+    ASPERITY_TRY(const Experiment changed, felt_by(experiment, rival));
+    felt.push_back(changed.scene.instances().front().law);
+  }
   return loop_rates(experiment.scene, experiment.path, felt, experiment.rate);
 }
 
@@ -272,13 +230,15 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   const fs::path folder =
       options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
   std::vector<Rival> rivals;
-  for (const std::string& name : options.laws.empty() ? default_laws(experiment.scene) : options.laws)
-    rivals.push_back(parse_rival(name));
+  for (const std::string& name : options.laws.empty() ? default_rivals(experiment.scene) : options.laws) {
+    ASPERITY_TRY(Rival rival, parse_rival(name));
+    rivals.push_back(std::move(rival));
+  }
   // Every pair is checked before anything is run or written.
   Representations representations(options, experiment, progress);
   for (const Rival& rival : rivals) {
     ASPERITY_TRY(const Experiment* felt, representations.find(rival.kind));
-    if (auto changed = felt_by(*felt, rival.law); !changed) return std::move(changed).error();
+    if (auto changed = felt_by(*felt, rival); !changed) return std::move(changed).error();
   }
   ASPERITY_TRY(const Scene* exact, representations.exact(rivals));
   ASPERITY_CHECK(check_length(experiment));
@@ -327,6 +287,12 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   return exit_success;
 }
 
+std::string words_of_friction() {
+  std::string list;
+  for (const std::string& name : friction_names()) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
 }  // namespace
 
 CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
@@ -336,7 +302,7 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
   command
       ->add_option("--laws", options->laws,
                    "Laws, separated by commas; default: those that suit the scene. mesh/LAW, relief/LAW, implicit/LAW: "
-                   "meshes felt through that representation")
+                   "meshes felt through that representation. LAW+FRICTION, LAW+texture-literal, ...: see below")
       ->delimiter(',');
   command->add_flag("--one-way", options->one_way,
                     "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
@@ -353,6 +319,9 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
       "depth pressed of edges that fold by 20 degrees or more.\n"
       "On an isosurface a second table says which share of straight passages through a layer each law notices at the "
       "scene's rate.\n"
+      "Behind a law, after \"+\": a friction law (" +
+      words_of_friction() +
+      "), also with -literal; no-friction, texture, texture-literal, no-texture, lay, lay-literal.\n"
       "Examples:\n"
       "  asperity compare M_a-H_3 --laws proxy,mesostructure,force-shading\n"
       "  asperity compare bunny.obj --implicit --laws mesh/proxy,proxy,virtual-contact-point\n"

@@ -104,6 +104,25 @@ void crest_line(const Coat& coat, double force, double stiffness, std::vector<st
   }
 }
 
+/// What of features laid on a formula can be felt.
+void parametric_lines(const ParametricSurface& surface, double force, double stiffness,
+                      std::vector<std::string>& lines) {
+  if (surface.settings().features.empty()) {
+    lines.push_back("no features in its geometry: the shape alone constrains");
+    return;
+  }
+  const double range = surface.limits().highest - surface.limits().lowest;
+  lines.push_back(
+      fmt::format("features of up to {} in its geometry change the force by up to {:.3g} N at {:g} N/mm; "
+                  "{:g} N are just noticed",
+                  format_length(range), range * stiffness, stiffness * 1e-3, noticed_force));
+  const double bend = std::max(0.0, -surface.limits().lowest) + force / stiffness;
+  lines.push_back(
+      fmt::format("the contact is {} deep at {:.3g} N, {} with the features' own depth; the surface is "
+                  "followed in strides of {}",
+                  format_length(force / stiffness), force, format_length(bend), format_length(surface.stride())));
+}
+
 /// What the voxels and the stored band let through.
 void potential_lines(const ImplicitSurface& surface, const Instance& instance, double force,
                      std::vector<std::string>& lines) {
@@ -153,6 +172,8 @@ std::vector<std::string> feel_of(const Experiment& experiment, const Instance& i
   } else if (const IsoSurface* iso = iso_of(instance.surface)) {
     lines.push_back(fmt::format("the isosurface has no detail below its cells of {}",
                                 format_length(iso->field().narrowest_cell())));
+  } else if (parametric_of(instance.surface) != nullptr) {
+    parametric_lines(*parametric_of(instance.surface), force, stiffness, lines);
   } else {
     lines.push_back("no coat: the shape alone is felt");
   }

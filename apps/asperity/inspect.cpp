@@ -14,6 +14,7 @@
 #include "apps/asperity/scene_argument.h"
 #include "asperity/field/brick_store.h"
 #include "asperity/field/image.h"
+#include "asperity/field/roughness.h"
 #include "asperity/io/image_io.h"
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/sparse_io.h"
@@ -28,6 +29,7 @@ namespace fs = std::filesystem;
 struct InspectOptions {
   std::string file;
   SceneArgument scene;
+  double friction = 0.2;  ///< of the smooth material of a map
 };
 
 /// What inspecting found, in the order it is shown.
@@ -80,8 +82,7 @@ Result<Findings> inspect_trace(const std::string& file) {
   return found;
 }
 
-Result<Findings> inspect_scene(const InspectOptions& options, const Progress& progress) {
-  ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
+Findings scene_findings(const Experiment& experiment) {
   Findings found{"scene", {}, {}, {}};
   found.fact("name", experiment.name);
   for (const ReportFact& fact : setup_facts(experiment)) found.facts.push_back(fact);
@@ -94,6 +95,11 @@ Result<Findings> inspect_scene(const InspectOptions& options, const Progress& pr
       found.felt.push_back(fmt::format("{}: {}", instance.name, line));
   }
   return found;
+}
+
+Result<Findings> inspect_scene(const InspectOptions& options, const Progress& progress) {
+  ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
+  return scene_findings(experiment);
 }
 
 /// What the file is as a scene of its own.
@@ -122,6 +128,39 @@ Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& pro
   return found;
 }
 
+std::string roughness_text(const Roughness& roughness) {
+  // What rounding leaves of a straight profile is no roughness.
+  constexpr double rounding = 1e-15;
+  const auto length = [](double metres) { return format_length(metres < rounding ? 0.0 : metres); };
+  return fmt::format("R_a {}, R_q {}, mean slope {:.3g}", length(roughness.average), length(roughness.rms),
+                     roughness.mean_slope);
+}
+
+/// Roughness of the relief as it is laid on, and the friction it would make if it were felt as nothing else.
+void topography_facts(const Experiment& laid, double smooth, Findings& found) {
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&laid.scene.instances().front().surface);
+  if (relief == nullptr) return;
+  const Mesostructure& maps = (*relief)->coat().maps();
+  const SurfaceRoughness roughness = surface_roughness(maps.heights(), maps.tile());
+  found.fact("roughness along the width", roughness_text(roughness.along_s));
+  found.fact("roughness along the height", roughness_text(roughness.along_t));
+  const FrictionProposal proposal = propose_friction(roughness, smooth);
+  const double along_s = proposal.rough_along_s ? proposal.across : proposal.along;
+  const double along_t = proposal.rough_along_s ? proposal.along : proposal.across;
+  found.fact("friction proposed", fmt::format("{:.3g} along the width, {:.3g} along the height", along_s, along_t));
+  std::string reason = fmt::format(
+      "friction: to {:g} of the smooth material (--friction) comes the mean slope of each direction, because carrying "
+      "a load up a slope m takes m times the load and none of it comes back where the slider drops off; at most 2",
+      smooth);
+  const double shortest = 4.0 * (*relief)->coat().texel_size();
+  const FeatureScale scale = scale_of(shortest, feature_scales(laid.device.position_resolution));
+  if (scale != FeatureScale::friction) {
+    reason += fmt::format("; waves of {} and more are felt as {} themselves, so it holds where the relief is left out",
+                          format_length(shortest), scale_name(scale));
+  }
+  found.felt.push_back(std::move(reason));
+}
+
 /// A map alone, laid on a sheet so that what can be felt of it has a size.
 Result<Findings> inspect_image(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(const Image image, read_image(options.file));
@@ -142,7 +181,8 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   laid.scene.scene = "M_a-H_0";
   laid.scene.relief = options.file;
   laid.scene.mapping = "triplanar";
-  ASPERITY_TRY(const Findings scene, inspect_scene(laid, progress));
+  ASPERITY_TRY(const Experiment experiment, load_scene(laid.scene, progress));
+  const Findings scene = scene_findings(experiment);
   for (const std::string& note : scene.problems) {
     if (note.starts_with("coat:")) found.problems.push_back(note);
   }
@@ -150,6 +190,7 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
     if (fact.name.starts_with("surface")) found.fact("laid on a sheet", fact.value);
   }
   found.felt = scene.felt;
+  topography_facts(experiment, options.friction, found);
   return found;
 }
 
@@ -300,6 +341,11 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
   command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
   command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
   command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
+  command
+      ->add_option("--friction", options->friction,
+                   "Of a map: coefficient of friction of its material where it is smooth")
+      ->check(CLI::Range(0.0, 2.0))
+      ->capture_default_str();
   command->add_option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");
   command->add_option("--speed", options->scene.speed, "Of the hand: 20mm/s");
   command->add_option("--force", options->scene.force, "Of the hand: 1N");

@@ -56,6 +56,7 @@ int run(int argc, char** argv) {
   add_replay(app, console, action);
   add_inspect(app, console, action);
   add_convert(app, console, action);
+  add_fit_friction(app, console, action);
   add_scenes(app, console, action);
   add_bench(app, console, action);
   add_schema(app, console, action);

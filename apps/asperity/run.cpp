@@ -102,7 +102,21 @@ std::string implicit_fact(const ImplicitSurface& surface) {
   return text;
 }
 
+std::string parametric_fact(const ParametricSurface& surface) {
+  const Vec3 extent = surface.bounds().extent();
+  std::string text =
+      fmt::format("{} by formula, {} x {} x {}, {:.0f} kB of bounds", parametric_name(surface.settings().shape),
+                  format_length(extent.x()), format_length(extent.y()), format_length(extent.z()),
+                  1e-3 * static_cast<double>(surface.memory_bytes()));
+  if (!surface.settings().features.empty()) {
+    text += fmt::format(", features {} to {}", format_length(surface.limits().lowest),
+                        format_length(surface.limits().highest));
+  }
+  return text;
+}
+
 std::string surface_fact(const Instance& instance) {
+  if (const ParametricSurface* parametric = parametric_of(instance.surface)) return parametric_fact(*parametric);
   if (const ImplicitSurface* implicit = implicit_of(instance.surface)) return implicit_fact(*implicit);
   if (const IsoSurface* iso = iso_of(instance.surface)) return volume_fact(*iso);
   const TriangleMesh& mesh = base_mesh(instance.surface);

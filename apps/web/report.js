@@ -263,6 +263,10 @@ window.addEventListener("error", (event) => {
     draw_picture();
     section("Along the stroke", "What the hand felt and where the felt point went, over the distance travelled.");
     series_plot(page, law.force_distance, { title: "Force", x: "distance (mm)", y: "N", unit: "mm", group: "distance", colours: forces, tall: true });
+    if (law.parts_distance) {
+      series_plot(page, law.parts_distance, { title: "Friction and texture", hint: "Parts of the tangential force along the direction of travel; what remains of it is constraint. Negative resists.",
+        x: "distance (mm)", y: "N", unit: "mm", group: "distance", colours: ["#228833", "#aa3377"] });
+    }
     series_plot(page, law.height_distance, { title: "Height over the base", hint: "Followed: of the proxy, or of the probe with the force's own deflection removed. Relief: the reconstructed map at the same base point.",
       x: "distance (mm)", y: "mm", unit: "mm", group: "distance", colours: [force_colours.normal, "#e0853a"] });
     series_plot(page, law.direction_distance, { title: "Angle of the force to the surface's normal", x: "distance (mm)", y: "deg", unit: "mm", group: "distance", zero: true, colours: ["#aa3377"] });
@@ -361,6 +365,10 @@ window.addEventListener("error", (event) => {
     section("Along the stroke");
     law_plot(page, "force_distance", 1, { title: "Normal force", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
     law_plot(page, "force_distance", 2, { title: "Tangential force", hint: "Along the direction of travel; negative resists.", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
+    if (data.laws.every((law) => law.parts_distance)) {
+      law_plot(page, "parts_distance", 1, { title: "Friction", hint: "Along the direction of travel; negative resists.", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
+      law_plot(page, "parts_distance", 2, { title: "Lateral force of the texture", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
+    }
     law_plot(page, "height_distance", 1, { title: "Height followed", x: "distance (mm)", y: "mm", unit: "mm", group: "distance" });
     law_plot(page, "direction_distance", 1, { title: "Direction error", x: "distance (mm)", y: "deg", unit: "mm", group: "distance", zero: true });
     if (data.laws.every((law) => law.follow_time))

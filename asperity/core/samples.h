@@ -30,8 +30,9 @@ enum class TickFlag : std::uint32_t {
       1u << 7,  ///< more instances within reach than a probe can hold at once; the farther ones are not felt
   energy_limited =
       1u << 8,  ///< the contact's spring would have gained energy from a change of the scene, and was softened
-  coarse_data = 1u << 9,   ///< part of a volume was not in memory yet and was felt from a coarser level
-  field_force = 1u << 10,  ///< a volume without a surface pushes
+  coarse_data = 1u << 9,     ///< part of a volume was not in memory yet and was felt from a coarser level
+  field_force = 1u << 10,    ///< a volume without a surface pushes
+  texture_faded = 1u << 11,  ///< a texture is finer than speed or device can render, and was felt weaker
 };
 
 /// A set of TickFlag.
@@ -66,9 +67,17 @@ struct ContactSummary {
   double height = 0.0;                ///< relief height under the probe (m); 0 without a coat
 };
 
+/// Parts of a force (heterogeneous-features-2008, eq. 1); what remains of the whole is constraint. World frame (N).
+struct ForceParts {
+  Vec3 friction = Vec3::Zero();
+  Vec3 texture = Vec3::Zero();
+  double held = 0.0;  ///< energy in the springs of friction laws (J)
+};
+
 /// What the hand should feel. World frame, SI.
 struct ForceSample {
   Wrench wrench;
+  ForceParts parts;           ///< of the wrench's force; not recorded in traces
   Vec3 proxy = Vec3::Zero();  ///< the probe's constrained twin (m); equals the probe's position in free space
   ContactSummary contact;
   Flags flags;

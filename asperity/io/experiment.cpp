@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/scene_fine.h"
 
 namespace asperity {
 namespace {
@@ -35,7 +35,10 @@ Box base_bounds(std::span<const Instance> instances) {
   Box bounds;
   for (const Instance& instance : instances) {
     const MeshSurface* base = base_of(instance.surface);
-    const Box local = base != nullptr ? base->bounds() : iso_of(instance.surface)->surface_bounds();
+    const IsoSurface* iso = iso_of(instance.surface);
+    const Box local = base != nullptr  ? base->bounds()
+                      : iso != nullptr ? iso->surface_bounds()
+                                       : surface_bounds(instance.surface);
     for (unsigned corner = 0; corner < 8; ++corner) {
       bounds.include(instance.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
                                                            (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
@@ -49,6 +52,12 @@ Box base_bounds(std::span<const Instance> instances) {
 /// bricks is asked on its coarsest level, the one that is always in memory.
 SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, double& distance) {
   SurfacePoint nearest{p, Vec3::Zero()};
+  if (const ParametricSurface* parametric = parametric_of(surface)) {
+    const Foot foot = parametric->closest(p, infinity, hint);
+    distance = foot.distance;
+    if (foot.found()) nearest = {foot.point, parametric->normal(parametric->jet(hint.parametric.uv))};
+    return nearest;
+  }
   if (base_of(surface) == nullptr) {
     const IsoSurface* iso = iso_of(surface);
     const IsoView view = iso->view(iso->field().levels() - 1);
@@ -66,16 +75,29 @@ SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, doubl
   return nearest;
 }
 
+/// What carries a surface's features: a stroke runs along it, and not up and down with them.
+Surface carrier_of(const Surface& surface) {
+  const ParametricSurface* parametric = parametric_of(surface);
+  if (parametric == nullptr || parametric->settings().features.empty()) return surface;
+  ParametricSettings bare = parametric->settings();
+  bare.features.clear();
+  Result<ParametricSurface> carrier = ParametricSurface::build(bare);
+  return carrier ? Surface(std::make_shared<const ParametricSurface>(std::move(*carrier))) : surface;
+}
+
 /// The nearest point of all surfaces.
 SurfaceProjector projector(const Scene& scene) {
-  return [&scene, hints = std::vector<Hint>(scene.instances().size())](const Vec3& p) mutable {
+  std::vector<Surface> carriers;
+  for (const Instance& instance : scene.instances()) carriers.push_back(carrier_of(instance.surface));
+  return [&scene, carriers = std::move(carriers),
+          hints = std::vector<Hint>(scene.instances().size())](const Vec3& p) mutable {
     SurfacePoint best{p, Vec3::Zero()};
     double nearest = infinity;
     for (std::size_t i = 0; i < scene.instances().size(); ++i) {
       const Instance& instance = scene.instances()[i];
       double distance = infinity;
       const SurfacePoint found =
-          nearest_on(instance.surface, instance.world_from_object.apply_inverse(p), hints[i], distance);
+          nearest_on(carriers[i], instance.world_from_object.apply_inverse(p), hints[i], distance);
       if (!(distance < nearest)) continue;
       nearest = distance;
       best.point = instance.world_from_object.apply(found.point);
@@ -180,6 +202,8 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   if (progress) progress("laying the stroke", 0.0);
   Result<StrokePath> path = build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene));
   if (!path) return std::move(path).error().at("stroke");
+  for (const Instance& instance : scene.instances())
+    note_rendering(instance, *path, stroke.value.speed, probe.value.rate, context);
 
   root.write("device", std::move(device.canonical));
   root.write("hand", std::move(hand.canonical));

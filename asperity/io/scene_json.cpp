@@ -324,6 +324,24 @@ Vec3 ObjectReader::lengths(std::string_view key, const Vec3& fallback) {
   return answer;
 }
 
+Vec2 ObjectReader::pair(std::string_view key, Dimension dimension, const Vec2& fallback, const Range& range) {
+  const SceneJson* value = raw(key);
+  Vec2 answer = fallback;
+  if (value != nullptr && value->is_array()) {
+    if (value->size() != 2) {
+      const char* what = dimension == Dimension::length ? "length" : "number";
+      fail(key, fmt::format("has {} {}s", value->size(), what), fmt::format("one {}, or two [along u, along v]", what));
+      return fallback;
+    }
+    for (std::size_t i = 0; i < 2; ++i)
+      answer[static_cast<int>(i)] = value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), dimension, range);
+  } else if (value != nullptr) {
+    answer = Vec2::Constant(value_of(*value, place_of(key), dimension, range));
+  }
+  write(key, SceneJson::array({answer.x(), answer.y()}));
+  return failed() ? fallback : answer;
+}
+
 Vec3 ObjectReader::direction(std::string_view key, const Vec3& fallback) {
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;

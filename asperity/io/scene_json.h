@@ -75,6 +75,8 @@ class ObjectReader {
   std::size_t choice(std::string_view key, std::span<const std::string> names, std::size_t fallback);
   /// Three lengths (m, or texts with units).
   Vec3 lengths(std::string_view key, const Vec3& fallback);
+  /// One quantity for both, or two (SI, or texts with units).
+  Vec2 pair(std::string_view key, Dimension dimension, const Vec2& fallback, const Range& range = {});
   /// Three plain numbers.
   Vec3 direction(std::string_view key, const Vec3& fallback);
   /// The value as it stands, or nullptr.

@@ -30,18 +30,6 @@ const std::vector<std::string>& axis_names() {
   return names;
 }
 
-/// Turns the named axis to +y, by signs and swaps alone, so that planes stay exactly plane.
-Vec3 turned_up(const Vec3& p, std::size_t axis) {
-  switch (axis) {
-    case 0: return {-p.y(), p.x(), p.z()};
-    case 2: return {p.x(), p.z(), -p.y()};
-    case 3: return {p.y(), -p.x(), p.z()};
-    case 4: return {p.x(), -p.y(), -p.z()};
-    case 5: return {p.x(), -p.z(), p.y()};
-    default: return p;
-  }
-}
-
 /// Reads one generator's parameters; every one that it does not take is refused by name.
 class GeneratorReader {
  public:
@@ -301,6 +289,22 @@ void note_fit(const MeshPart& part, const char* unit, const Vec3& extent, double
 
 }  // namespace
 
+// By signs and swaps alone, so that planes stay exactly plane.
+Vec3 turned_up(const Vec3& p, std::size_t axis) {
+  switch (axis) {
+    case 0: return {-p.y(), p.x(), p.z()};
+    case 2: return {p.x(), p.z(), -p.y()};
+    case 3: return {p.y(), -p.x(), p.z()};
+    case 4: return {p.x(), -p.y(), -p.z()};
+    case 5: return {p.x(), -p.z(), p.y()};
+    default: return p;
+  }
+}
+
+std::size_t read_up(ObjectReader& surface, std::size_t fallback) {
+  return surface.choice("up", axis_names(), fallback);
+}
+
 double read_units(ObjectReader& surface, bool from_file) {
   static const std::vector<std::string> names{"m", "cm", "mm", "um", "in"};
   if (!from_file) {
@@ -351,7 +355,7 @@ Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   // Generators lay open sheets in z = 0 with their touched side towards +z.
   const bool closed = part.name == "icosphere" || part.name == "M_d" || part.name == "box" || part.name == "random";
   const bool flat = !part.from_file && !closed;
-  const std::size_t up = surface.choice("up", axis_names(), flat ? 2 : 1);
+  const std::size_t up = read_up(surface, flat ? 2 : 1);
   ASPERITY_CHECK(surface.status());
 
   const Box bounds = used_bounds(part.source);

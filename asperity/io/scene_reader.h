@@ -90,6 +90,11 @@ struct MeshPart {
 /// Reads `mesh`, `units`, `fit` and `up` of a surface. Sets an error in `surface` or answers one. [build]
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context);
 
+/// A point whose axis `up` (x, y, z, -x, -y, -z) is turned to +y. [build]
+Vec3 turned_up(const Vec3& p, std::size_t up);
+/// Reads `up`; `fallback` is its position among x, y, z, -x, -y, -z. [build]
+std::size_t read_up(ObjectReader& surface, std::size_t fallback);
+
 /// Welds, cleans and validates it, with its notes; its errors name the file. [build]
 Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context);
 
@@ -120,6 +125,8 @@ struct ImplicitFeel {
 /// Reads `implicit` of a surface, its mesh and coat where it has them. [build]
 Status read_implicit(ObjectReader& surface, const ImplicitFeel& feel, SceneContext& context, Instance& instance);
 
+/// Mean length (m) of one unit of the mesh's texture coordinates; its mean edge where it has none. [any]
+double texture_unit(const TriangleMesh& mesh);
 /// A coat for `mesh`. [build]
 Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
                                   SceneContext& context);

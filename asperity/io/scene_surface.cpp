@@ -5,25 +5,31 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/scene_fine.h"
 
 namespace asperity {
 namespace {
 
 constexpr double preferred_stiffness = 1000.0;  // N/m: the papers' 1 N/mm
 
-Result<Material> read_material(const SceneJson* json, ObjectReader& surface, SceneContext& context) {
+struct MaterialPart {
+  Material material;
+  FinePart fine;
+};
+
+Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface, SceneContext& context) {
   static const SceneJson empty = SceneJson::object();
   ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("material"), "material");
   const DeviceProfile& device = context.device;
-  Material material;
+  MaterialPart part;
+  Material& material = part.material;
   material.stiffness = reader.quantity("stiffness", Dimension::stiffness,
                                        std::min(preferred_stiffness, device.max_stiffness), Range::positive());
   material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
   material.static_friction = reader.number("static_friction", 0.0, Range::not_negative());
   // Sliding holds less than sticking: without a number of its own, four fifths of it.
   material.dynamic_friction = reader.number("dynamic_friction", 0.8 * material.static_friction, Range::not_negative());
-  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(part.fine, read_friction(reader, context, material));
   if (auto valid = validate(material); !valid) return std::move(valid).error().at(surface.place_of("material"));
   if (material.stiffness > device.max_stiffness) {
     context.note(
@@ -31,7 +37,7 @@ Result<Material> read_material(const SceneJson* json, ObjectReader& surface, Sce
                     material.stiffness, device.max_stiffness, device.name));
   }
   surface.take("material", std::move(reader));
-  return material;
+  return part;
 }
 
 Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& context, const std::string& name) {
@@ -51,9 +57,9 @@ Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& c
   return sides;
 }
 
-/// The relief, with a note on what building it had to change.
+/// The relief, with a note on what building it had to change. `place`: of what it is made from.
 Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface, SceneContext& context,
-                             const std::string& name) {
+                             const std::string& name, const std::string& place) {
   static const std::vector<std::string> cures{"cure", "refuse"};
   static const std::vector<std::string> directions{"least_squares", "relaxed"};
   ReliefSettings settings;
@@ -62,14 +68,15 @@ Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface,
   ASPERITY_CHECK(surface.status());
   if (context.progress) context.progress("fitting the relief", 0.0);
   Result<ReliefSurface> relief = ReliefSurface::build(std::move(base), std::move(coat), settings);
-  if (!relief) return std::move(relief).error().at(surface.place_of("coat"));
+  if (!relief) return std::move(relief).error().at(place);
   if (const std::string advice = relief->report().advice(); !advice.empty())
     context.note(fmt::format("coat on \"{}\": {}", name, advice));
   return Surface(std::make_shared<const ReliefSurface>(std::move(relief).value()));
 }
 
-/// What can be touched, of triangles: mesh, sides, coat.
-Status read_triangles(ObjectReader& reader, SceneContext& context, Instance& instance) {
+/// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
+Status read_triangles(ObjectReader& reader, const Law& law, SceneContext& context, Instance& instance,
+                      TexturePart& texture) {
   static const std::vector<std::string> searches{"bvh", "octree"};
   reader.refuse({"iso"}, "without a volume");
   ASPERITY_CHECK(reader.status());
@@ -79,9 +86,26 @@ Status read_triangles(ObjectReader& reader, SceneContext& context, Instance& ins
   ASPERITY_CHECK(reader.status());
   if (context.progress) context.progress("building the search structure", 0.0);
   ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), reader, context));
+  const SceneJson* coat_json = reader.raw("coat");
+  const TextureHost host{instance.name, mesh.bounds(), &mesh, nullptr, coat_json == nullptr ? "" : "a coated mesh"};
+  ASPERITY_TRY(texture, read_texture(reader, host, law, context));
+  std::shared_ptr<const Mesostructure> baked;
+  if (!texture.geometry.empty()) {
+    ASPERITY_TRY(BakedFeatures features,
+                 bake_features(mesh, texture.geometry, texture.fine.mapping, reader.place_of("texture.features")));
+    mesh = std::move(features.mesh);
+    baked = std::move(features.maps);
+  }
   MeshSurface base(TriangleIndex::build(std::move(mesh), search));
   instance.sides = read_sides(reader, base, context, instance.name);
-  const SceneJson* coat_json = reader.raw("coat");
+  if (baked != nullptr) {
+    const std::string place = reader.place_of("texture.features");
+    Result<Coat> coat = Coat::build(base.mesh(), std::move(baked), CoatSettings{});
+    if (!coat) return std::move(coat).error().at(place);
+    ASPERITY_TRY(instance.surface,
+                 build_relief(std::move(base), std::move(*coat), reader, context, instance.name, place));
+    return success();
+  }
   if (coat_json == nullptr) {
     reader.refuse({"on_overlap", "shell_directions"}, "without a coat");
     instance.surface = std::make_shared<const MeshSurface>(std::move(base));
@@ -89,7 +113,8 @@ Status read_triangles(ObjectReader& reader, SceneContext& context, Instance& ins
   }
   ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
   reader.write("coat", std::move(coat.canonical));
-  ASPERITY_TRY(instance.surface, build_relief(std::move(base), std::move(coat.value), reader, context, instance.name));
+  ASPERITY_TRY(instance.surface, build_relief(std::move(base), std::move(coat.value), reader, context, instance.name,
+                                              reader.place_of("coat")));
   return success();
 }
 
@@ -105,6 +130,13 @@ Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& in
   ASPERITY_TRY(std::shared_ptr<const IsoSurface> surface, read_iso(reader, volume, context));
   instance.surface = std::move(surface);
   return success();
+}
+
+/// A shape's own axis `up` turned to +y before its pose.
+Pose upright(const Pose& pose, std::size_t up) {
+  Mat3 turn;
+  turn << turned_up(Vec3::UnitX(), up), turned_up(Vec3::UnitY(), up), turned_up(Vec3::UnitZ(), up);
+  return {pose.position, (pose.orientation * Quat(turn)).normalized()};
 }
 
 }  // namespace
@@ -159,23 +191,39 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   ObjectReader reader(json, place, "surface");
   ASPERITY_CHECK(reader.status());
   Instance instance;
-  if (!reader.has("implicit")) {
-    ASPERITY_CHECK(reader.has("volume") ? read_isosurface(reader, context, instance)
-                                        : read_triangles(reader, context, instance));
+  ScenePart<Law> law{instance.law, law_json(instance.law)};
+  if (const SceneJson* given = reader.raw("law")) {
+    ASPERITY_TRY(law, read_law(*given, reader.place_of("law"), context));
+  }
+  instance.law = law.value;
+  TexturePart texture;
+  if (reader.has("implicit") && !reader.has("parametric")) {
+    // Read below.
+  } else if (reader.has("parametric")) {
+    ASPERITY_CHECK(read_parametric(reader, instance.law, context, instance, texture));
+  } else if (reader.has("volume")) {
+    ASPERITY_CHECK(read_isosurface(reader, context, instance));
+  } else {
+    ASPERITY_CHECK(read_triangles(reader, instance.law, context, instance, texture));
   }
   ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
-  ASPERITY_TRY(instance.material, read_material(reader.raw("material"), reader, context));
-  reader.write("law", law_json(instance.law));
-  if (const SceneJson* law = reader.raw("law")) {
-    ASPERITY_TRY(ScenePart<Law> read, read_law(*law, reader.place_of("law"), context));
-    instance.law = std::move(read.value);
-    reader.write("law", std::move(read.canonical));
-  }
+  if (reader.has("parametric")) instance.world_from_object = upright(instance.world_from_object, read_up(reader, 2));
+  ASPERITY_TRY(MaterialPart material, read_material(reader.raw("material"), reader, context));
+  instance.material = material.material;
+  reader.write("law", std::move(law.canonical));
   if (reader.has("implicit")) {
     // Last: how far its potential is stored depends on how it is felt.
     const ImplicitFeel feel{instance.law, instance.material, context.probe_radius};
     ASPERITY_CHECK(read_implicit(reader, feel, context, instance));
   }
+  if (iso_of(instance.surface) != nullptr) {
+    const MeshSurface* made_from = base_of(instance.surface);
+    const TextureHost host{instance.name, surface_bounds(instance.surface),
+                           made_from == nullptr ? nullptr : &made_from->mesh(), nullptr,
+                           reader.has("implicit") ? "an implicit surface" : "a volume"};
+    ASPERITY_TRY(texture, read_texture(reader, host, instance.law, context));
+  }
+  ASPERITY_CHECK(attach_fine(reader, std::move(texture), material.fine, context, instance));
   ASPERITY_CHECK(reader.status());
   return ScenePart<Instance>{std::move(instance), std::move(reader.canonical())};
 }

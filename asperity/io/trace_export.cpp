@@ -120,7 +120,7 @@ std::string trace_sidecar_json(const Trace& trace) {
   const Json flags{
       {"1", "contact"},          {"2", "not_converged"}, {"4", "started_inside"},     {"8", "input_not_finite"},
       {"16", "force_limited"},   {"32", "slew_limited"}, {"64", "output_not_finite"}, {"128", "contacts_dropped"},
-      {"256", "energy_limited"}, {"512", "coarse_data"}, {"1024", "field_force"}};
+      {"256", "energy_limited"}, {"512", "coarse_data"}, {"1024", "field_force"},     {"2048", "texture_faded"}};
   Json json;
   json["format"] = "asperity trace table";
   json["version"] = 1;

@@ -32,6 +32,7 @@ Status validate(const Material& material) {
                  "dynamic_friction",
                  "a coefficient from 0 to static_friction"};
   }
+  if (Status friction = validate(material.friction); !friction) return std::move(friction).error().at("friction");
   return success();
 }
 

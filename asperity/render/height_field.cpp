@@ -51,15 +51,13 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
     const bool deeper =
         penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
     if (penetration <= 0.0 || !deeper) return;
-    answer = {true,
-              stiffness * penetration * frame.normal,
-              probe + penetration * frame.normal,
-              frame.normal,
-              penetration,
-              height,
-              face,
-              false,
-              Vec3::Zero()};
+    answer.contact = true;
+    answer.force = stiffness * penetration * frame.normal;
+    answer.point = probe + penetration * frame.normal;
+    answer.normal = frame.normal;
+    answer.penetration = penetration;
+    answer.height = height;
+    answer.element = face;
   });
   return answer;
 }

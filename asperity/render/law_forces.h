@@ -16,8 +16,13 @@ struct LawForce {
   double penetration = 0.0;    ///< m
   double height = 0.0;         ///< relief height under the probe (m)
   std::uint32_t element = no_index;
-  bool damped = false;       ///< damping is part of the force already
-  Vec3 turn = Vec3::Zero();  ///< N, lateral force of consistent shading, to be added as far as its budget lets it
+  bool damped = false;           ///< damping is part of the force already
+  double push = 0.0;             ///< N along the normal, before damping: what friction and texture go by
+  Vec3 friction = Vec3::Zero();  ///< N, the part of the force that is friction
+  Vec3 texture = Vec3::Zero();   ///< N, the part that is texture
+  double held = 0.0;             ///< J, in the spring of a friction law
+  Mat3 bend = Mat3::Zero();      ///< 1/m: how the normal changes along the surface (shape operator), where it is known
+  Vec3 turn = Vec3::Zero();      ///< N, lateral force of consistent shading, to be added as far as its budget lets it
 };
 
 /// haptic-textures-2005, 3.3; hrm-2010, Algorithm 1. `probe` and `velocity` in the object frame. [servo]

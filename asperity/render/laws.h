@@ -6,13 +6,11 @@
 #include <variant>
 #include <vector>
 
+#include "asperity/core/formulation.h"
 #include "asperity/core/result.h"
 #include "asperity/surface/stitching.h"
 
 namespace asperity {
-
-/// As printed in the paper, its defects included, for reproduction; or with its errata resolved.
-enum class Formulation { literal, consistent };
 
 /// The default: one proxy on the true surface, the displaced one where there is a coat (formulation D6, amendments 5 to
 /// 9). It never passes through, moves only where its distance to the probe falls, sticks and slides by Coulomb's cone

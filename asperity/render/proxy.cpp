@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/render/fine_contact.h"
+
 namespace asperity {
 
 namespace {
@@ -138,7 +140,7 @@ class ReliefProxy {
 }  // namespace
 
 Friction friction_of(const Instance& instance, const Material& material) noexcept {
-  if (!std::holds_alternative<ProxyLaw>(instance.law)) return {};
+  if (!proxy_holds_friction(instance)) return {};
   return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction};
 }
 

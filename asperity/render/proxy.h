@@ -11,7 +11,7 @@ struct Friction {
   double still = 0.0;
   double sliding = 0.0;
 };
-/// A material's coefficients; none unless the instance's law is the proxy. [servo]
+/// A material's coefficients; none unless the proxy itself holds the friction. [servo]
 Friction friction_of(const Instance& instance, const Material& material) noexcept;
 
 /// Where the proxy of a point came to rest.

@@ -5,6 +5,7 @@
 #include "asperity/render/god_object.h"
 #include "asperity/render/iso_proxy.h"
 #include "asperity/render/joint_proxy.h"
+#include "asperity/render/parametric_proxy.h"
 #include "asperity/render/proxy.h"
 
 namespace asperity {
@@ -31,9 +32,24 @@ const IsoSurface* proxied_iso(const Instance& instance) noexcept {
   return std::holds_alternative<ProxyLaw>(instance.law) ? iso_of(instance.surface) : nullptr;
 }
 
+const ParametricSurface* proxied_parametric(const Instance& instance) noexcept {
+  return std::holds_alternative<ProxyLaw>(instance.law) ? parametric_of(instance.surface) : nullptr;
+}
+
 /// Whether the proxy's law goes by a smooth surface rather than by triangles.
 bool smooth(const Instance& instance) noexcept {
-  return proxied_relief(instance) != nullptr || proxied_iso(instance) != nullptr;
+  return proxied_relief(instance) != nullptr || proxied_parametric(instance) != nullptr ||
+         proxied_iso(instance) != nullptr;
+}
+
+/// The point of one smooth surface, object frame. `jet`: of a parametric surface, where it rests.
+ProxyRest solve_on_smooth(const Instance& instance, const Friction& friction, const Vec3& from, const Vec3& probe,
+                          ContactState& slot, ParametricJet& jet) noexcept {
+  if (const ReliefSurface* relief = proxied_relief(instance))
+    return solve_on_relief(*relief, instance.sides, friction, from, probe, slot);
+  if (const ParametricSurface* parametric = proxied_parametric(instance))
+    return solve_on_parametric(*parametric, instance.sides, friction, from, probe, slot, jet);
+  return solve_on_iso(felt_view(*proxied_iso(instance), slot), instance.sides, friction, from, probe, slot);
 }
 
 /// One smooth surface, touched by a point, or by a ball where the surface has one level further out for it.
@@ -47,11 +63,8 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
   // Friction is that of the place where the proxy rests.
   const Vec3& place = slot.touching ? slot.iso.point : local_from;
   const Friction friction = friction_of(instance, local_material(instance, place, slot.hint.sparse));
-  const ReliefSurface* relief = proxied_relief(instance);
-  const ProxyRest rest = relief != nullptr
-                             ? solve_on_relief(*relief, instance.sides, friction, local_from, local_probe, slot)
-                             : solve_on_iso(felt_view(*proxied_iso(instance), slot), instance.sides, friction,
-                                            local_from, local_probe, slot);
+  ParametricJet jet;
+  const ProxyRest rest = solve_on_smooth(instance, friction, local_from, local_probe, slot, jet);
   ProxyAnswer answer;
   answer.converged = rest.converged;
   answer.proxy = position;
@@ -67,9 +80,16 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
     law.force = with_damping(on_cone(material.stiffness * spring, law.normal, friction, slot.sliding), law.normal,
                              probe.twist.linear, material.damping);
     law.point = answer.proxy - radius * law.normal;
-    if (relief != nullptr) {
+    if (proxied_relief(instance) != nullptr) {
       law.height = slot.point.jet.height;
       law.element = slot.hint.relief.frame.face;
+    } else if (const ParametricSurface* parametric = proxied_parametric(instance)) {
+      law.element = parametric->element_of(slot.hint.parametric.uv);
+      law.height = jet.height;
+      if (instance.fine != nullptr) {
+        const Mat3 bend = slot.side * parametric->shape_operator(jet);
+        law.bend = at_origin ? bend : Mat3(pose.orientation * bend * pose.orientation.conjugate());
+      }
     } else {
       law.element = element_at(instance, rest.proxy - radius * rest.normal, slot);
     }
@@ -202,6 +222,7 @@ void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, Prox
         const double share = (may + paid) / would;
         stiffness *= share;
         answer.energy_limited = true;
+        answer.rendered_share = share;
         for (ProxyAnswer::Part& part : answer.parts) part.law.force *= share;
       }
     } else {
@@ -215,7 +236,10 @@ void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, Prox
 Vec3 off_the_surface(const Instance& instance, const ContactState& slot) noexcept {
   const ReliefSurface* relief = proxied_relief(instance);
   const Vec3 normal = relief != nullptr ? Vec3(slot.side * slot.point.normal()) : slot.iso.normal;
-  const double skin = relief != nullptr ? relief->skin() : proxied_iso(instance)->skin();
+  const ParametricSurface* parametric = proxied_parametric(instance);
+  const double skin = relief != nullptr       ? relief->skin()
+                      : parametric != nullptr ? parametric->skin()
+                                              : proxied_iso(instance)->skin();
   return 2.0 * skin * instance.world_from_object.rotate(normal);
 }
 
@@ -328,6 +352,11 @@ Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
       if (!foot.found()) continue;
       front = relief->point(slot.hint.relief.frame, slot.hint.relief.u, slot.hint.relief.v).normal();
       skin = relief->skin();
+    } else if (const ParametricSurface* parametric = proxied_parametric(instance)) {
+      foot = parametric->closest(local, infinity, slot.hint);
+      if (!foot.found()) continue;
+      front = parametric->normal(parametric->jet(slot.hint.parametric.uv));
+      skin = parametric->skin();
     } else if (const MeshSurface* mesh = constraint_mesh(instance)) {
       foot = mesh->closest(local, infinity, slot.hint);
       if (!foot.found()) continue;

@@ -17,6 +17,7 @@ struct ProxyAnswer {
   FixedVector<Part, 4> parts;
   bool converged = true;
   bool energy_limited = false;
+  double rendered_share = 1.0;  ///< of the parts' stiffness, where energy was limited
 };
 
 /// Solves for the instances of the state's slots whose law constrains. Reads and writes the state's tank and friction,

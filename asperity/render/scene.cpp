@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asperity/core/units.h"
+#include "asperity/render/fine_contact.h"
 #include "asperity/surface/relief_mesh.h"
 
 namespace asperity {
@@ -83,14 +84,16 @@ Status check_potential(const Instance& instance, const std::string& place) {
 Status check_pair(const Instance& instance, const std::string& place) {
   const bool iso = iso_of(instance.surface) != nullptr;
   const bool implicit = implicit_of(instance.surface) != nullptr;
+  const bool parametric = parametric_of(instance.surface) != nullptr;
   const bool bare = instance.surface.index() == 0;
   const auto refuse = [&](const char* what, const char* accepted) {
     return Error{ErrorCode::unsupported_pair,
                  fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
-                             implicit ? "an implicit surface"
-                             : iso    ? "an isosurface"
-                             : bare   ? "a bare mesh"
-                                      : "a relief"),
+                             implicit     ? "an implicit surface"
+                             : iso        ? "an isosurface"
+                             : parametric ? "a parametric surface"
+                             : bare       ? "a bare mesh"
+                                          : "a relief"),
                  {},
                  place + ".law",
                  accepted};
@@ -104,6 +107,8 @@ Status check_pair(const Instance& instance, const std::string& place) {
                   implicit ? "proxy, virtual-contact-point, magnetic, normal-perturbation, avila or cross-uncross"
                            : "proxy, avila or cross-uncross");
   }
+  if (parametric && !std::holds_alternative<ProxyLaw>(instance.law))
+    return refuse(needs_coat(instance.law) ? "a coat" : "triangles", "proxy");
   if (bare && needs_coat(instance.law))
     return refuse("a coat", "proxy, god-object or force-shading, or a coat on the mesh");
   return success();
@@ -116,9 +121,10 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
                  "holds no surface",
                  {},
                  place + ".surface",
-                 "a mesh, relief, isosurface or implicit surface"};
+                 "a mesh, relief, isosurface, implicit or parametric surface"};
   }
   ASPERITY_CHECK(check_pair(instance, place));
+  ASPERITY_CHECK(check_fine(instance, place));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
   if (probe_radius > 0.0 && !constrains(instance.law)) {
@@ -127,8 +133,9 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
                              law_name(instance.law), format_length(probe_radius)),
                  {},
                  place + ".law",
-                 iso_of(instance.surface) != nullptr ? "proxy, or probe.radius 0"
-                                                     : "proxy, god-object or force-shading, or probe.radius 0"};
+                 base_of(instance.surface) != nullptr && iso_of(instance.surface) == nullptr
+                     ? "proxy, god-object or force-shading, or probe.radius 0"
+                     : "proxy, or probe.radius 0"};
   }
   const Pose& pose = instance.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
@@ -153,7 +160,7 @@ Box transformed(const Box& box, const Pose& pose) {
 }  // namespace
 
 const char* surface_kind(const Surface& surface) {
-  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit"};
+  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit", "parametric"};
   return names[surface.index()];
 }
 
@@ -171,6 +178,11 @@ const MeshSurface* base_of(const Surface& surface) noexcept {
 const ImplicitSurface* implicit_of(const Surface& surface) noexcept {
   const auto* implicit = std::get_if<std::shared_ptr<const ImplicitSurface>>(&surface);
   return implicit != nullptr ? implicit->get() : nullptr;
+}
+
+const ParametricSurface* parametric_of(const Surface& surface) noexcept {
+  const auto* parametric = std::get_if<std::shared_ptr<const ParametricSurface>>(&surface);
+  return parametric != nullptr ? parametric->get() : nullptr;
 }
 
 const IsoSurface* iso_of(const Surface& surface) noexcept {
@@ -252,6 +264,8 @@ std::size_t Scene::memory_bytes() const noexcept {
     if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
     if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
       bytes += implicit->memory_bytes();
+    } else if (const ParametricSurface* parametric = parametric_of(instance.surface)) {
+      bytes += parametric->memory_bytes();
     } else if (const IsoSurface* iso = iso_of(instance.surface)) {
       bytes += iso->field().memory_bytes();
     } else if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {

@@ -12,19 +12,22 @@
 #include "asperity/core/result.h"
 #include "asperity/material/material.h"
 #include "asperity/render/field_effects.h"
+#include "asperity/render/fine_features.h"
 #include "asperity/render/laws.h"
 #include "asperity/surface/implicit_surface.h"
 #include "asperity/surface/iso_surface.h"
 #include "asperity/surface/mesh_surface.h"
+#include "asperity/surface/parametric_surface.h"
 #include "asperity/surface/relief_surface.h"
 
 namespace asperity {
 
 /// The closed set of providers. Shared, because snapshots that follow one another share what did not change.
 using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr<const ReliefSurface>,
-                             std::shared_ptr<const IsoSurface>, std::shared_ptr<const ImplicitSurface>>;
+                             std::shared_ptr<const IsoSurface>, std::shared_ptr<const ImplicitSurface>,
+                             std::shared_ptr<const ParametricSurface>>;
 
-/// "mesh", "relief", "iso", "implicit": the provider's name in messages. [any]
+/// "mesh", "relief", "iso", "implicit", "parametric": the provider's name in messages. [any]
 const char* surface_kind(const Surface& surface);
 /// Bounds in the object frame (m). [any]
 Box surface_bounds(const Surface& surface);
@@ -34,6 +37,8 @@ const MeshSurface* base_of(const Surface& surface) noexcept;
 const IsoSurface* iso_of(const Surface& surface) noexcept;
 /// The implicit surface, or nullptr. [any]
 const ImplicitSurface* implicit_of(const Surface& surface) noexcept;
+/// The parametric surface, or nullptr. [any]
+const ParametricSurface* parametric_of(const Surface& surface) noexcept;
 /// The mesh of a surface that has one. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 
@@ -50,6 +55,8 @@ struct Instance {
   Surface surface;
   Law law = ProxyLaw{};
   Material material;
+  /// Texture, lay and maps of friction beside what is in the surface; nullptr: none.
+  std::shared_ptr<const FineFeatures> fine;
   Sides sides = Sides::both;
   Pose world_from_object;
   /// Law dense-mesh: what is felt. Filled by Scene::build, which takes one that is here already if it fits.

@@ -1,12 +1,13 @@
 #pragma once
-// A smooth surface as the joint solve sees it: a relief, or an isosurface of this tick. Private to render.
+// A smooth surface as the joint solve sees it: a relief, a parametric surface, or an isosurface of this tick. Private
+// to render.
 
 #include "asperity/render/iso_proxy.h"
 #include "asperity/render/scene.h"
 
 namespace asperity {
 
-/// One of the two, or nothing where an instance is felt on triangles.
+/// One of the three, or nothing where an instance is felt on triangles.
 class SmoothSurface {
  public:
   SmoothSurface() = default;
@@ -15,24 +16,38 @@ class SmoothSurface {
     if (!std::holds_alternative<ProxyLaw>(instance.law)) return;
     if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface))
       relief_ = relief->get();
+    parametric_ = parametric_of(instance.surface);
     if (const IsoSurface* iso = iso_of(instance.surface)) iso_ = felt_view(*iso, slot);
   }
 
-  explicit operator bool() const noexcept { return relief_ != nullptr || iso_.field != nullptr; }
-  [[nodiscard]] double skin() const noexcept { return relief_ != nullptr ? relief_->skin() : iso_.skin(); }
+  explicit operator bool() const noexcept {
+    return relief_ != nullptr || parametric_ != nullptr || iso_.field != nullptr;
+  }
+  [[nodiscard]] double skin() const noexcept {
+    if (parametric_ != nullptr) return parametric_->skin();
+    return relief_ != nullptr ? relief_->skin() : iso_.skin();
+  }
   /// Smallest length over which the surface changes (m).
   [[nodiscard]] double grain() const noexcept {
+    if (parametric_ != nullptr) return parametric_->grain();
     return relief_ != nullptr ? relief_->grain() : iso_.field->narrowest_cell();
   }
   /// Distance from which the way to the nearest point tells the direction better than the surface's own normal does
   /// (m): a relief's folds have none; on an isosurface the point is found to within a share of a cell.
-  [[nodiscard]] double direction_from() const noexcept { return relief_ != nullptr ? skin() : 0.05 * grain(); }
+  [[nodiscard]] double direction_from() const noexcept { return iso_.field == nullptr ? skin() : 0.05 * grain(); }
   /// Whether two of its tangent planes may meet in an edge.
-  [[nodiscard]] bool has_folds() const noexcept { return relief_ != nullptr; }
+  [[nodiscard]] bool has_folds() const noexcept {
+    return relief_ != nullptr || (parametric_ != nullptr && parametric_->has_folds());
+  }
   /// How far beyond touching a tangent plane is worth knowing (m).
-  [[nodiscard]] double plane_reach() const noexcept { return relief_ != nullptr ? 2.0 * skin() : 0.05 * grain(); }
+  [[nodiscard]] double plane_reach() const noexcept { return has_folds() ? 2.0 * skin() : 0.05 * grain(); }
   /// The nearest point within `bound`, and the surface's front normal there. [servo]
   [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint, Vec3& front) const noexcept {
+    if (parametric_ != nullptr) {
+      const Foot foot = parametric_->closest(p, bound, hint);
+      if (foot.found()) front = parametric_->normal(parametric_->jet(hint.parametric.uv));
+      return foot;
+    }
     if (relief_ == nullptr) {
       const Foot foot = iso_.closest(p, bound, hint.iso);
       if (foot.found()) front = iso_.outward(foot.point, hint.iso);
@@ -45,6 +60,7 @@ class SmoothSurface {
   /// First touch of a point. [servo]
   [[nodiscard]] SweptHit segment(const Segment& motion, Sides sides, Hint& hint) const noexcept {
     if (relief_ != nullptr) return relief_->segment(motion, 0.0, sides, hint);
+    if (parametric_ != nullptr) return parametric_->segment(motion, 0.0, sides, hint);
     SweptHit hit;
     const IsoCrossing crossing = iso_.first_touch(motion, sides, hint.iso);
     hit.hit = crossing.found;
@@ -54,6 +70,7 @@ class SmoothSurface {
 
  private:
   const ReliefSurface* relief_ = nullptr;
+  const ParametricSurface* parametric_ = nullptr;
   IsoView iso_;
 };
 

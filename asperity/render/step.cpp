@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "asperity/render/fine_contact.h"
 #include "asperity/render/iso_proxy.h"
 #include "asperity/render/proxy_tick.h"
 
@@ -21,6 +22,9 @@ struct Tick {
     }
     out.flags.set(TickFlag::contact);
     out.wrench.force += law.force;
+    out.parts.friction += law.friction;
+    out.parts.texture += law.texture;
+    out.parts.held += law.held;
     ++out.contact.count;
     const double size = law.force.norm();
     if (size <= strongest) return;
@@ -64,10 +68,13 @@ LawForce force_at(const Instance& instance, const Material& material, const Vec3
                   Seconds dt, ContactState& slot) noexcept {
   if (needs_potential(instance.law)) {
     const ImplicitSurface& surface = *implicit_of(instance.surface);
+    // Where friction is a force of its own the contact point is not held back as well.
+    Material own = instance.material;
+    own.friction_named = adds_friction(instance);
     if (const auto* law = std::get_if<VirtualContactPointLaw>(&instance.law))
-      return virtual_contact_force(*law, surface, instance.material, probe, velocity, dt, slot);
+      return virtual_contact_force(*law, surface, own, probe, velocity, dt, slot);
     if (const auto* law = std::get_if<MagneticLaw>(&instance.law))
-      return magnetic_force(*law, surface, instance.material, probe, velocity, dt, slot);
+      return magnetic_force(*law, surface, own, probe, velocity, dt, slot);
     return normal_perturbation_force(surface, material, probe, slot);
   }
   if (const IsoSurface* iso = iso_of(instance.surface)) {
@@ -84,12 +91,30 @@ LawForce force_at(const Instance& instance, const Material& material, const Vec3
   return mesostructure_force(*std::get_if<MesostructureLaw>(&instance.law), relief, material, probe, slot);
 }
 
-/// A law without a proxy, in the world frame.
+/// The probe's motion as an instance sees it.
+FineMotion motion_over(const Instance& instance, const ProbeSample& probe, const Vec3& previous, Seconds dt) noexcept {
+  const Pose& pose = instance.world_from_object;
+  const Vec3 moved = probe.pose.position - previous;
+  if (pose.is_identity()) return {moved, probe.twist.linear, dt};
+  return {pose.rotate_inverse(moved), pose.rotate_inverse(probe.twist.linear), dt};
+}
+
+/// A law's answer and its parts, turned into the world frame.
+void to_world(const Pose& pose, LawForce& law) noexcept {
+  if (pose.is_identity()) return;
+  law.force = pose.rotate(law.force);
+  law.friction = pose.rotate(law.friction);
+  law.texture = pose.rotate(law.texture);
+  law.point = pose.apply(law.point);
+  law.normal = pose.rotate(law.normal);
+}
+
+/// A law without a proxy, in the world frame, with friction and texture.
 LawForce added_force(const Instance& instance, const ProbeSample& probe, const Vec3& previous, bool first_tick,
-                     Seconds dt, ContactState& slot) noexcept {
+                     Seconds dt, ContactState& slot, Tick& tick, EnergyTank& tank) noexcept {
   const Pose& pose = instance.world_from_object;
   const bool at_origin = pose.is_identity();
-  const Vec3 velocity = at_origin ? probe.twist.linear : pose.rotate_inverse(probe.twist.linear);
+  const FineMotion motion = motion_over(instance, probe, previous, dt);
   // A probe that enters within one tick was outside at the last one: ask there first.
   const IsoSurface* iso = iso_of(instance.surface);
   const bool fresh = iso != nullptr ? !slot.iso.started : !slot.seen_outside;
@@ -97,17 +122,49 @@ LawForce added_force(const Instance& instance, const ProbeSample& probe, const V
   // The contact point's laws look the material up where that is.
   const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
   const Material material = elsewhere ? instance.material : local_material(instance, position, slot.hint.sparse);
-  if (fresh && !first_tick) force_at(instance, material, pose.apply_inverse(previous), velocity, dt, slot);
-  LawForce law = force_at(instance, material, position, velocity, dt, slot);
-  if (!law.contact) return law;
-  if (iso != nullptr) law.element = element_at(instance, law.point, slot);
-  if (!at_origin) {
-    law.force = pose.rotate(law.force);
-    law.point = pose.apply(law.point);
-    law.normal = pose.rotate(law.normal);
+  if (fresh && !first_tick) force_at(instance, material, pose.apply_inverse(previous), motion.velocity, dt, slot);
+  LawForce law = force_at(instance, material, position, motion.velocity, dt, slot);
+  slot.touching = law.contact;
+  if (law.contact) {
+    if (iso != nullptr) law.element = element_at(instance, law.point, slot);
+    if (!law.damped) {
+      law.push = law.force.dot(law.normal);
+      law.force = with_damping(law.force, law.normal, motion.velocity, material.damping);
+    }
   }
-  if (!law.damped) law.force = with_damping(law.force, law.normal, probe.twist.linear, material.damping);
+  if (instance.fine != nullptr || adds_friction(instance)) {
+    const Material felt = elsewhere ? local_material(instance, law.point, slot.hint.sparse) : material;
+    if (add_fine_forces(instance, felt, felt.stiffness, motion, slot, tank, law))
+      tick.out.flags.set(TickFlag::texture_faded);
+  }
+  to_world(pose, law);
   return law;
+}
+
+/// What friction and texture add to a proxy's answer, which is in the world frame.
+void add_to_proxy(const Instance& instance, double share, const FineMotion& motion, ContactState& slot, Tick& tick,
+                  EnergyTank& tank, ProxyAnswer::Part& part) noexcept {
+  LawForce& law = part.law;
+  if (proxy_holds_friction(instance)) {
+    if (law.contact && instance.material.static_friction > 0.0)
+      law.friction = law.force - law.force.dot(law.normal) * law.normal;
+    return;
+  }
+  if (instance.fine == nullptr && !adds_friction(instance)) return;
+  const double stiffness = share * part.stiffness;
+  law.push = stiffness * law.penetration;
+  const Pose& pose = instance.world_from_object;
+  if (!pose.is_identity()) {
+    law.force = pose.rotate_inverse(law.force);
+    law.point = pose.apply_inverse(law.point);
+    law.normal = pose.rotate_inverse(law.normal);
+    const Mat3 turn = pose.orientation.toRotationMatrix();
+    law.bend = turn.transpose() * law.bend * turn;
+  }
+  const Material material = local_material(instance, law.point, slot.hint.sparse);
+  if (add_fine_forces(instance, material, stiffness, motion, slot, tank, law))
+    tick.out.flags.set(TickFlag::texture_faded);
+  to_world(pose, law);
 }
 
 /// Every place that one tick may ask a volume about: the proxy never gets farther from the probe than it is, and both
@@ -283,14 +340,21 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& probe
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.instances()[slot.instance];
     if (constrains(instance.law)) continue;
-    const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, dt, slot);
-    slot.touching = law.contact;
+    const LawForce law = added_force(instance, probe, state.previous_probe, first_tick, dt, slot, tick, state.tank);
     tick.add(slot.instance, law);
     if (law.contact) shadow = law.point;
   }
-  const ProxyAnswer answer = solve_proxies(scene, state, probe, held, moved);
+  ProxyAnswer answer = solve_proxies(scene, state, probe, held, moved);
   state.proxy = answer.proxy;
-  for (const ProxyAnswer::Part& part : answer.parts) tick.add(part.instance, part.law);
+  for (ProxyAnswer::Part& part : answer.parts) {
+    const Instance& instance = scene.instances()[part.instance];
+    for (ContactState& slot : state.contacts) {
+      if (slot.instance == part.instance)
+        add_to_proxy(instance, answer.rendered_share, motion_over(instance, probe, state.previous_probe, dt), slot,
+                     tick, state.tank, part);
+    }
+    tick.add(part.instance, part.law);
+  }
   tick.out.proxy = answer.parts.empty() ? shadow : answer.felt;
   add_effects(scene, level, probe, tick.out);
   tick.out.flags.set(TickFlag::not_converged, !answer.converged);

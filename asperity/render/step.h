@@ -2,6 +2,7 @@
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/samples.h"
+#include "asperity/material/friction.h"
 #include "asperity/render/energy_tank.h"
 #include "asperity/render/scene.h"
 #include "asperity/surface/surface.h"
@@ -23,6 +24,15 @@ struct IsoContact {
   bool started = false;          ///< cross-uncross: `previous` and `value` are of a tick
 };
 
+/// What one probe remembers of a texture that it touches.
+struct TextureState {
+  bool held = false;           ///< the rest is of a contact that goes on
+  Vec3 force = Vec3::Zero();   ///< of the texture at the last tick (N, object frame)
+  double potential = 0.0;      ///< of the texture at the last tick (J)
+  double book = 0.0;           ///< J: what it has taken beyond what its potential holds; below 0: given
+  Vec3 across = Vec3::Zero();  ///< direction of the lay's gradient, where it was known last
+};
+
 /// What one probe remembers of one instance between ticks.
 struct ContactState {
   std::uint32_t instance = no_index;
@@ -37,9 +47,11 @@ struct ContactState {
   /// What that has taken from the hand and not yet given back (J); laws of implicit surfaces: what may be spent where
   /// the local stiffness rises.
   double turn_budget = 0.0;
-  double side = 1.0;  ///< proxy on a relief: 1 when touched from the front, -1 from the back
-  ReliefPoint point;  ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
-  IsoContact iso;     ///< on an isosurface
+  double side = 1.0;       ///< proxy on a relief: 1 when touched from the front, -1 from the back
+  ReliefPoint point;       ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
+  IsoContact iso;          ///< on an isosurface
+  FrictionState friction;  ///< of the friction law, where it is not within the proxy (object frame)
+  TextureState texture;
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per

@@ -113,7 +113,7 @@ LawForce printed_push(const ImplicitSurface& surface, ContactMagnitude magnitude
   }
   Vec3 point = probe + contact.depth * contact.direction;
   const Material material = material_at(surface, own, contact.original, state.hint.sparse);
-  if (material.dynamic_friction > 0.0)
+  if (material.dynamic_friction > 0.0 && !material.friction_named)
     point = printed_drag(surface, offset, friction_of(material, depth_gain, contact.depth), point, probe, state);
   state.iso.crossed = true;
   state.iso.point = point;
@@ -121,6 +121,7 @@ LawForce printed_push(const ImplicitSurface& surface, ContactMagnitude magnitude
   LawForce answer;
   answer.contact = true;
   answer.damped = true;
+  answer.push = material.stiffness * (point - probe).dot(contact.direction);
   answer.force = material.stiffness * (point - probe) - material.damping * velocity;  // eq. 1
   answer.point = offset > 0.0 ? contact.original : point;
   answer.normal = contact.direction;
@@ -385,7 +386,7 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   const Spring spring = spring_at(felt, trust, rule.band, here, probe, state);
   const Vec3 normal = state.iso.normal;
   const Material material = material_at(surface, own, spring.foot - rule.offset * normal, state.hint.sparse);
-  const bool drags = material.dynamic_friction > 0.0 && !outside;
+  const bool drags = material.dynamic_friction > 0.0 && !material.friction_named && !outside;
   Vec3 point = spring.foot;
   Vec3 pull = spring.pull;
   double energy = spring.energy;
@@ -418,6 +419,7 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   // Of a force that is an energy's slope, the depth that the energy goes by.
   answer.penetration = !drags && spring.trust == 1.0 ? -here.value : pull.norm();
   answer.force = stiffness * pull;
+  answer.push = outside ? 0.0 : answer.force.dot(normal);
   if (rule.band > 0.0) {
     answer.force += magnet_damping(here.value, rule.band, material.damping, normal, velocity);
   } else {

@@ -212,6 +212,16 @@ json picture_data(const std::optional<Picture>& picture) {
           {"caption", picture->caption}};
 }
 
+/// Friction and texture in the tangential force, where a run has any.
+json parts_rows(const RunSeries& s, std::size_t stretches) {
+  const auto any = [](const std::vector<double>& values) {
+    return std::any_of(values.begin(), values.end(), [](double v) { return std::abs(v) > 0.0; });
+  };
+  if (!any(s.friction) && !any(s.texture)) return nullptr;
+  return plot_rows(s, {"distance", &s.distance, milli}, {{"friction", &s.friction, 1.0}, {"texture", &s.texture, 1.0}},
+                   true, stretches);
+}
+
 /// What a comparison shows of a law.
 json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, std::size_t stretches) {
   const Column distance{"distance", &s.distance, milli};
@@ -226,6 +236,7 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
           {"verdict", verdict(m)},
           {"numbers", numbers(m)},
           {"force_distance", plot_rows(s, distance, force, true, stretches)},
+          {"parts_distance", parts_rows(s, stretches)},
           {"height_distance", plot_rows(s, distance, heights, true, stretches)},
           {"direction_distance", plot_rows(s, distance, {{"angle", &s.direction_error, degrees}}, true, stretches)},
           {"energy_time", plot_rows(s, time, energy, false, stretches)},
@@ -260,10 +271,10 @@ json loop_rate_data(const std::vector<LoopRateRow>& rows) {
 Status check_series(const RunSeries& series, const std::string& place) {
   const std::size_t n = series.time.size();
   const bool equal = series.distance.size() == n && series.force.size() == n && series.normal.size() == n &&
-                     series.tangential.size() == n && series.followed.size() == n && series.relief.size() == n &&
-                     series.direction_error.size() == n && series.work.size() == n && series.stored.size() == n &&
-                     series.follow.size() == n && series.update.size() == n && series.near_step.size() == n &&
-                     series.stroking.size() == n;
+                     series.tangential.size() == n && series.friction.size() == n && series.texture.size() == n &&
+                     series.followed.size() == n && series.relief.size() == n && series.direction_error.size() == n &&
+                     series.work.size() == n && series.stored.size() == n && series.follow.size() == n &&
+                     series.update.size() == n && series.near_step.size() == n && series.stroking.size() == n;
   if (equal) return success();
   return Error{ErrorCode::bad_value, "has columns of different lengths", "", place, "columns with one value a tick"};
 }

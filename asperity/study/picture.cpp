@@ -67,9 +67,10 @@ std::vector<Vec3> framing_points(const Scene& scene, const StrokePath& path) {
     return points;
   }
   for (const Instance& instance : scene.instances()) {
-    if (const IsoSurface* iso = iso_of(instance.surface); iso != nullptr && base_of(instance.surface) == nullptr) {
+    if (base_of(instance.surface) == nullptr) {
+      const IsoSurface* iso = iso_of(instance.surface);
       std::vector<Vec3> corners;
-      add_corners(iso->surface_bounds(), corners);
+      add_corners(iso != nullptr ? iso->surface_bounds() : surface_bounds(instance.surface), corners);
       for (const Vec3& corner : corners) points.push_back(instance.world_from_object.apply(corner));
       continue;
     }

@@ -9,6 +9,8 @@
 #include <utility>
 #include <variant>
 
+#include "asperity/render/fine_contact.h"
+
 namespace asperity {
 namespace {
 
@@ -41,13 +43,14 @@ Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
   return inside;
 }
 
-/// First touch of a mesh or an isosurface by the ray's parameter, from the sides that can be touched.
+/// First touch of a mesh, an isosurface or a parametric surface by the ray's parameter, from the sides that can be
+/// touched.
 template <class S>
 Pixel first_touch(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
   const Segment motion{origin + part.from * direction, origin + part.to * direction};
   const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
   if (!hit.hit) return {};
-  return {part.from + hit.t * (part.to - part.from), hit.contact.normal};
+  return {part.from + hit.t * (part.to - part.from), hit.contact.normal, hit.contact.element};
 }
 
 Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
@@ -56,6 +59,11 @@ Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& dire
 }
 
 Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+Pixel first_hit(const ParametricSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
                 Hint& hint) {
   return first_touch(surface, origin, direction, part, sides, hint);
 }
@@ -86,7 +94,8 @@ Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& di
     const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
     if (!hit.hit) return {};
     const double t = part.from + hit.t * (part.to - part.from);
-    if (!open || !beside_rim(surface, origin + t * direction, hint)) return {t, hit.contact.normal};
+    if (!open || !beside_rim(surface, origin + t * direction, hint))
+      return {t, hit.contact.normal, hit.contact.element};
     part.from = t + 10.0 * after;
   }
   return {};
@@ -234,9 +243,15 @@ Pixel RayCaster::cast(double x, double y) {
     const Pixel seen = std::visit(
         [&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, hints_[i]); }, instance.surface);
     if (!seen.hit() || seen.depth >= nearest.depth) continue;
-    nearest.depth = seen.depth;
-    nearest.normal = instance.world_from_object.rotate(seen.normal);
-    if (nearest.normal.dot(direction) > 0.0) nearest.normal = -nearest.normal;
+    nearest = seen;
+    Vec3 normal = seen.normal.dot(along) > 0.0 ? Vec3(-seen.normal) : seen.normal;
+    if (instance.fine != nullptr) {
+      // What is felt as a texture is seen as one.
+      const double footprint = camera_->pixel * seen.depth;
+      normal -= texture_at(instance, seen.element, from + seen.depth * along, normal, hints_[i], footprint).gradient;
+      normal.normalize();
+    }
+    nearest.normal = instance.world_from_object.rotate(normal);
   }
   return nearest;
 }

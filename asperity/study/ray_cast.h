@@ -13,8 +13,9 @@ namespace asperity {
 
 /// What one ray saw.
 struct Pixel {
-  double depth = infinity;     ///< along the camera's forward axis (m); infinity: nothing
-  Vec3 normal = Vec3::Zero();  ///< unit, towards the eye
+  double depth = infinity;           ///< along the camera's forward axis (m); infinity: nothing
+  Vec3 normal = Vec3::Zero();        ///< unit, towards the eye; bent by a texture
+  std::uint32_t element = no_index;  ///< face, where the surface has faces
   [[nodiscard]] bool hit() const { return depth < infinity; }
 };
 

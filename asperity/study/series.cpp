@@ -6,6 +6,7 @@
 #include <memory>
 #include <variant>
 
+#include "asperity/render/fine_contact.h"
 #include "asperity/study/follow.h"
 
 namespace asperity {
@@ -73,8 +74,9 @@ class SeriesBuilder {
         path_(path),
         hints_(std::make_unique<Hint[]>(scene.instances().size())),
         followed_(followed_instance(scene)) {
-    for (auto* column : {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.followed,
-                         &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.follow, &out_.update}) {
+    for (auto* column :
+         {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.friction, &out_.texture,
+          &out_.followed, &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.follow, &out_.update}) {
       column->reserve(ticks);
     }
   }
@@ -89,6 +91,8 @@ class SeriesBuilder {
     out_.force.push_back(tick.commanded.norm());
     out_.normal.push_back(tick.commanded.dot(pose.normal));
     out_.tangential.push_back(tick.commanded.dot(pose.tangent));
+    out_.friction.push_back(tick.rendered.parts.friction.dot(pose.tangent));
+    out_.texture.push_back(tick.rendered.parts.texture.dot(pose.tangent));
     out_.update.push_back(tick.update_seconds);
     out_.follow.push_back(followed_ == nullptr
                               ? nan
@@ -134,7 +138,7 @@ class SeriesBuilder {
     // M1's layer is as stiff as the field is steep.
     if (instance && std::holds_alternative<AvilaLaw>(instance->law))
       push = std::max(0.0, tick.rendered.wrench.force.dot(tick.rendered.contact.normal));
-    out_.stored.push_back(0.5 * push * depth);
+    out_.stored.push_back(0.5 * push * depth + tick.rendered.parts.held);
   }
 
   void add_surface(const TraceRecord& tick, const Vec3& tangent) {
@@ -145,11 +149,19 @@ class SeriesBuilder {
     out_.near_edge.push_back(0);
     const Instance* instance = touched(tick);
     if (!instance) return;
+    if (instance->fine != nullptr && instance->fine->has_texture()) {
+      add_textured(*instance, tick);
+      return;
+    }
     const Surface& shape = shapes_.instances()[tick.rendered.contact.instance].surface;
     if (iso_of(shape) != nullptr && !has_exact_mesh(shape)) {
       add_isosurface(*instance, *iso_of(shape), tick);
       if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
         add_texture(*instance, *implicit, tick);
+      return;
+    }
+    if (const ParametricSurface* parametric = parametric_of(shape)) {
+      add_parametric(*instance, *parametric, tick);
       return;
     }
     const Pose& pose = instance->world_from_object;
@@ -211,6 +223,44 @@ class SeriesBuilder {
     out_.relief.back() = 0.0;
     if (!(force.norm() >= least_force) || outward.isZero()) return;
     if (from_behind) outward = -outward;
+    out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
+  }
+
+  /// Heights over the smooth surface that wears a texture: what is felt against the texture as it is.
+  void add_textured(const Instance& instance, const TraceRecord& tick) {
+    const Pose& pose = instance.world_from_object;
+    const ContactSummary& contact = tick.rendered.contact;
+    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Vec3 point = pose.apply_inverse(contact.point);
+    const Vec3 normal = pose.rotate_inverse(contact.normal);
+    Hint& hint = hints_[contact.instance];
+    const ParametricSurface* parametric = parametric_of(instance.surface);
+    if (parametric != nullptr && !parametric->closest(point, parametric->bounds().diagonal(), hint).found()) return;
+    const TextureShape shape = texture_at(instance, contact.element, point, normal, hint, 0.0);
+    const double over = (pose.apply_inverse(tick.probe.pose.position) - point).dot(normal) - scene_.probe_radius();
+    out_.followed.back() = over + force.dot(normal) / stiffness_at(instance, tick);
+    out_.relief.back() = shape.height;
+    if (!(force.norm() >= least_force)) return;
+    const Vec3 reference = normal - shape.gradient;
+    out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
+  }
+
+  /// Heights over the surface without its features, on the side touched.
+  void add_parametric(const Instance& instance, const ParametricSurface& surface, const TraceRecord& tick) {
+    const Pose& pose = instance.world_from_object;
+    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Vec3 felt = pose.apply_inverse(tick.rendered.proxy);
+    Hint& hint = hints_[tick.rendered.contact.instance];
+    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
+    if (!foot.found()) return;
+    const ParametricJet jet = surface.jet(hint.parametric.uv);
+    const Vec3 front = surface.normal(jet);
+    const double side = force.dot(front) < 0.0 ? -1.0 : 1.0;
+    const double over = foot.normal.dot(front) < 0.0 ? -foot.distance : foot.distance;
+    out_.followed.back() = side * (jet.height + over) - scene_.probe_radius();
+    out_.relief.back() = side * jet.height;
+    if (!(force.norm() >= least_force)) return;
+    const Vec3 outward = side * front;
     out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
   }
 

@@ -29,7 +29,8 @@ namespace asperity {
 /// On an implicit surface with a mesh the mesh is the base; relief is the height of what is felt over it (texture,
 /// offset), reference is the normal of what is felt. On an isosurface there is no base: followed is the signed distance
 /// of the felt point from the isosurface (negative inside), relief is 0, reference is the isosurface's normal at the
-/// point of it nearest to the felt one. Laws without a proxy are felt at probe + F / k.
+/// point of it nearest to the felt one. Laws without a proxy are felt at probe + F / k. Under a texture the base is the
+/// smooth surface, relief and reference are the texture's, and what is felt is at probe + F / k.
 struct RunSeries {
   std::vector<double> time;  ///< s
   std::vector<double>
@@ -37,13 +38,15 @@ struct RunSeries {
   std::vector<double> force;            ///< magnitude of the commanded force (N)
   std::vector<double> normal;           ///< commanded force along the stroke's normal (N)
   std::vector<double> tangential;       ///< commanded force along the direction of travel (N); negative resists
+  std::vector<double> friction;         ///< the friction in it, before the safety stage (N)
+  std::vector<double> texture;          ///< the texture's lateral force in it, likewise (N)
   std::vector<double> followed;         ///< m; in contact only
   std::vector<double> relief;           ///< m; in contact only
   std::vector<double> direction_error;  ///< angle of the rendered force to the reference normal (rad); from 1 mN on
   std::vector<double>
       work;  ///< done on the probe so far by the commanded force (J), trapezoid; positive: fed into the hand
-  std::vector<double>
-      stored;  ///< energy in the spring of the strongest contact, k penetration^2 / 2; of M1 F . n penetration / 2 (J)
+  std::vector<double> stored;   ///< energy in the spring of the strongest contact, k penetration^2 / 2; of M1 F . n
+                                ///< penetration / 2 (J); and in the springs of friction laws
   std::vector<double> follow;   ///< 0 to 1; not-a-number outside the volume and without an isosurface
   std::vector<double> update;   ///< time that `step` took (s)
   std::vector<char> near_step;  ///< 1 or 0

@@ -34,6 +34,12 @@ struct IsoHint {
   bool has_foot = false;
 };
 
+/// What a query of a parametric surface remembers: the last foot, and where a proxy on it rests.
+struct ParametricHint {
+  std::uint64_t owner = 0;  ///< identity of the surface; 0: nothing
+  Vec2 uv = Vec2::Zero();
+};
+
 /// What a query remembers of the last one. A cache in the caller's hands: re-validated by the provider that reads it,
 /// never trusted, free to be thrown away. One per probe and instance. [servo]
 struct Hint {
@@ -41,6 +47,7 @@ struct Hint {
   ReliefPlace relief;
   IsoHint iso;
   SparseHint sparse;
+  ParametricHint parametric;
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.

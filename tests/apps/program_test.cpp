@@ -257,6 +257,23 @@ TEST_F(Program, InspectKnowsEveryKindOfFile) {
   EXPECT_TRUE(has(run("inspect quick.json --stiffness 5000").out, "it may buzz"));
 }
 
+TEST_F(Program, InspectProposesFrictionFromATopography) {
+  // Grooves upright in the picture: each texel of 1 mm is 64 um above or below its neighbour, a slope of 0.064.
+  Image grooves{32, 32, 1, 8, {}};
+  for (int i = 0; i < 32 * 32; ++i)
+    grooves.samples.push_back(static_cast<std::uint16_t>(64 * (2 - std::abs(i % 4 - 2))));
+  ASSERT_TRUE(write_png(folder_ / "grooves.png", grooves).ok());
+  const Call call = run("inspect grooves.png --height 255um --tile 32mm --json");
+  ASSERT_EQ(call.code, 0) << call.err;
+  const json facts = json::parse(call.out)["facts"];
+  EXPECT_EQ(facts["friction proposed"], "0.264 along the width, 0.2 along the height");
+  EXPECT_TRUE(has(facts["roughness along the width"].get<std::string>(), "mean slope 0.064"));
+  const Call smooth = run("inspect grooves.png --height 255um --tile 32mm --friction 0.5");
+  EXPECT_TRUE(has(smooth.out, "0.564 along the width, 0.5 along the height")) << smooth.out;
+  EXPECT_TRUE(has(smooth.out, "to 0.5 of the smooth material (--friction) comes the mean slope")) << smooth.out;
+  refused("inspect grooves.png --friction 9", {"--friction"});
+}
+
 TEST_F(Program, ScenesAndSchemaPrint) {
   const Call list = run("scenes");
   EXPECT_EQ(list.code, 0);

@@ -81,6 +81,17 @@ std::vector<std::string> corpus() {
         "stroke":{"type":"polyline","points":[["0%","100%","0%"],["100%","100%","0%"]],"back_and_forth":true,"repeats":2}})",
       R"({"surfaces":[{"mesh":{"generator":"M_e","rings":2,"opening":"80 deg","mean_edge":"10mm"},"law":"force-shading"},
         {"mesh":{"generator":"plane","width":0.1,"depth":"10cm","triangles":8},"pose":{"orientation":[1,0.1,0,0]}}],"stroke":{"type":"circle"}})",
+      R"({"surfaces":[{"parametric":{"shape":"vase","radius":"30 mm","height":"90 mm","neck":0.4},"up":"z",
+        "texture":{"features":{"type":"grating","amplitude":"0.2 mm","count":42},"mapping":{"surface":"cylinder","radius":"30 mm"},
+        "as":"texture","formulation":"literal"},"material":{"static_friction":0.5,"friction":{"law":"karnopp","break_away":"0.4 N",
+        "stick_speed":"5 mm/s"},"lay":{"still_ratio":1,"sliding_ratio":"0 %","direction":"90 deg"}}}]})",
+      R"({"surfaces":[{"mesh":{"generator":"plane","width":0.06,"depth":0.04,"triangles":8},"texture":{"features":[
+        {"type":"grating","amplitude":"0.2 um","wavelength":"3 um"},{"type":"serrated","amplitude":"40 um","wavelength":"1 mm","wall":0.1},
+        {"type":"grid","amplitude":"0.2 mm","wavelength":["6 mm","8 mm"]},{"type":"map","height_map":{"generator":"H_1","size":16,"count":4},
+        "height":"0.1 mm","wavelength":"20 mm","as":"texture"}],"mapping":{"axis":[0,1,0]}},"material":{"friction":"dahl",
+        "friction_map":{"image":{"generator":"H_2","size":16},"low":0.5,"tile":"10 mm"}}}]})",
+      R"({"surfaces":[{"parametric":{"shape":"torus","radius":0.03,"tube":0.01},"texture":{"features":[{"type":"noise",
+        "roughness":"10 um","correlation_length":"2 mm","period":0,"as":"friction"}],"mapping":{"surface":"plane"}}}]})",
   };
 }
 

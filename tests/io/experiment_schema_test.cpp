@@ -78,29 +78,40 @@ TEST_F(ExperimentSchema, CanonicalCopiesAreValid) {
 }
 
 TEST_F(ExperimentSchema, ItRefusesWhatTheReaderRefuses) {
-  for (const char* scene : {
-           R"({})",
-           R"({"surfaces":[]})",
-           R"({"effects":[]})",
-           R"({"surfaces":[{}]})",
-           R"({"surfaces":[{"volume":{"generator":"sphre"}}]})",
-           R"({"surfaces":[{"volume":{"generator":"sphere","size":[1,8,8]}}]})",
-           R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity"}]})",
-           R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity","transfer":[[0]]}]})",
-           R"({"surfaces":[{"mesh":3}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"resolution":2}}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"voxel":0}}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"inside":"outside"}}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"texture":{"type":"perlin"}}}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"materials":[]}}]})",
-           R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"materials":[{"radius":0.01}]}}]})",
-           R"({"surfaces":[{"mesh":"a.obj","colour":"red"}]})",
-           R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})",
-           R"({"surfaces":[{"mesh":"a.obj","material":{"stiffness":0}}]})",
-           R"({"surfaces":[{"mesh":"a.obj","law":{"type":"mesostructure-literal","rho":0.5}}]})",
-           R"({"surfaces":[{"mesh":"a.obj"}],"device":"omega.8"})",
-           R"({"surfaces":[{"mesh":"a.obj"}],"stroke":{"type":"polyline","points":[[0,0,0]]}})",
-       }) {
+  for (
+      const char* scene : {
+          R"({})",
+          R"({"surfaces":[]})",
+          R"({"effects":[]})",
+          R"({"surfaces":[{}]})",
+          R"({"surfaces":[{"volume":{"generator":"sphre"}}]})",
+          R"({"surfaces":[{"volume":{"generator":"sphere","size":[1,8,8]}}]})",
+          R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity"}]})",
+          R"({"effects":[{"volume":{"generator":"sphere"},"type":"viscosity","transfer":[[0]]}]})",
+          R"({"surfaces":[{"mesh":3}]})",
+          R"({"surfaces":[{"parametric":{"shape":"cone"}}]})",
+          R"({"surfaces":[{"parametric":{"radius":0.01}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":[]}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"bump"}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"grating","amplitude":0,"wavelength":1e-3}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"mapping":{"surface":"cone"}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":"stribeck"}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":{"law":"dahl","exponent":5}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"lay":{"still_ratio":2}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction_map":{"image":"map.png"}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"resolution":2}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"voxel":0}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"inside":"outside"}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"texture":{"type":"perlin"}}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"materials":[]}}]})",
+          R"({"surfaces":[{"mesh":{"generator":"box"},"implicit":{"materials":[{"radius":0.01}]}}]})",
+          R"({"surfaces":[{"mesh":"a.obj","colour":"red"}]})",
+          R"({"surfaces":[{"mesh":{"generator":"icosphare"}}]})",
+          R"({"surfaces":[{"mesh":"a.obj","material":{"stiffness":0}}]})",
+          R"({"surfaces":[{"mesh":"a.obj","law":{"type":"mesostructure-literal","rho":0.5}}]})",
+          R"({"surfaces":[{"mesh":"a.obj"}],"device":"omega.8"})",
+          R"({"surfaces":[{"mesh":"a.obj"}],"stroke":{"type":"polyline","points":[[0,0,0]]}})",
+      }) {
     EXPECT_NE(violations(scene), "") << scene;
     EXPECT_FALSE(parse(scene).ok()) << scene;
   }
@@ -136,6 +147,9 @@ TEST_F(ExperimentSchema, NamesAreThoseOfTheProgram) {
   EXPECT_EQ(document["definitions"]["device"]["properties"]["profile"]["enum"], json(device_profile_names()));
   EXPECT_EQ(document["definitions"]["hand"]["properties"]["preset"]["enum"], json(hand_preset_names()));
   EXPECT_EQ(document["definitions"]["law"]["properties"]["type"]["enum"], json(law_names()));
+  EXPECT_EQ(document["definitions"]["friction"]["properties"]["law"]["enum"], json(friction_names()));
+  EXPECT_EQ(document["definitions"]["feature"]["properties"]["type"]["enum"], json(feature_names()));
+  EXPECT_EQ(document["definitions"]["parametric"]["properties"]["shape"]["enum"], json(parametric_names()));
 }
 
 /// A scene in which an object of one kind stands at `pointer`.
@@ -224,6 +238,44 @@ const Host hosts[] = {
     {"blend map", "/surfaces/0/law/blend",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"mesostructure-literal","blend":{"image":"map.png"}}}]})"},
     {"material", "/surfaces/0/material", R"({"surfaces":[{"mesh":{"generator":"box"},"material":{}}]})"},
+    {"surface", "/surfaces/0", R"({"surfaces":[{"parametric":{"shape":"plane"}}]})"},
+    {"parametric", "/surfaces/0/parametric", R"({"surfaces":[{"parametric":{"shape":"plane"}}]})"},
+    {"parametric", "/surfaces/0/parametric", R"({"surfaces":[{"parametric":{"shape":"vase"}}]})"},
+    {"parametric", "/surfaces/0/parametric", R"({"surfaces":[{"parametric":{"shape":"torus"}}]})"},
+    {"parametric", "/surfaces/0/parametric", R"({"surfaces":[{"parametric":{"shape":"ramp"}}]})"},
+    {"texture", "/surfaces/0/texture",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"grating","amplitude":1e-4,"wavelength":1e-3}}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"serrated","amplitude":1e-4,"wavelength":1e-3}}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"circular-grating","amplitude":1e-4,"wavelength":1e-3}}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"parametric":{"shape":"cylinder"},"texture":{"features":{"type":"grating","amplitude":1e-4,"count":100}}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"noise","roughness":1e-5,"correlation_length":1e-3}}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"noise","average_roughness":1e-5,"correlation_length":1e-3}}}]})"},
+    {"feature", "/surfaces/0/texture/features/0",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":[{"type":"map","height_map":"map.png","height":1e-4,"wavelength":0.01}],"as":"texture"}}]})"},
+    {"feature", "/surfaces/0/texture/features",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"map","height_map":"map.png","height_range":[0,1e-4],"wavelength":0.01,"as":"texture"}}}]})"},
+    {"feature mapping", "/surfaces/0/texture/mapping",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"grating","amplitude":1e-4,"wavelength":1e-3},"mapping":{"surface":"box"}}}]})"},
+    {"feature mapping", "/surfaces/0/texture/mapping",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"texture":{"features":{"type":"grating","amplitude":1e-4,"count":60},"mapping":{"surface":"cylinder"}}}]})"},
+    {"feature mapping", "/surfaces/0/texture/mapping",
+     R"({"surfaces":[{"parametric":{"shape":"plane"},"texture":{"features":{"type":"grating","amplitude":1e-4,"wavelength":1e-3},"mapping":{"surface":"uv"}}}]})"},
+    {"friction", "/surfaces/0/material/friction",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":{"law":"karnopp"}}}]})"},
+    {"friction", "/surfaces/0/material/friction",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":{"law":"dahl"}}}]})"},
+    {"friction", "/surfaces/0/material/friction",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":{"law":"hayward-armstrong"}}}]})"},
+    {"friction", "/surfaces/0/material/friction",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction":{"law":"lugre"}}}]})"},
+    {"lay", "/surfaces/0/material/lay", R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"lay":{}}}]})"},
+    {"friction map", "/surfaces/0/material/friction_map",
+     R"({"surfaces":[{"mesh":{"generator":"box"},"material":{"friction_map":{"image":"map.png","tile":0.01}}}]})"},
     {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{}})"},
     {"stroke", "/stroke", R"({"surfaces":[{"mesh":{"generator":"box"}}],"stroke":{"normal_force":1}})"},
     {"law", "/surfaces/0/law",

@@ -250,7 +250,7 @@ TEST(Follow, SeriesMetricsAndPageSpeakOfTheIsosurface) {
   EXPECT_LT(report.metrics.energy.generated, 1e-3 * force * 1e-4);
   const auto json = nlohmann::json::parse(metrics_json(report.metrics));
   EXPECT_NEAR(json["follow"]["global"].get<double>(), report.metrics.follow.global, 1e-12);
-  EXPECT_EQ(json["ticks"]["flags"].size(), 11u);
+  EXPECT_EQ(json["ticks"]["flags"].size(), 12u);
   EXPECT_TRUE(json["ticks"]["flags"].contains("coarse_data"));
   const auto html = run_report_html(report);
   ASSERT_TRUE(html.ok());
@@ -275,7 +275,8 @@ TEST(Flags, EveryBitHasItsName) {
   EXPECT_STREQ(flag_name(8), "energy_limited");
   EXPECT_STREQ(flag_name(9), "coarse_data");
   EXPECT_STREQ(flag_name(10), "field_force");
-  EXPECT_STREQ(flag_name(11), "unknown");
+  EXPECT_STREQ(flag_name(11), "texture_faded");
+  EXPECT_STREQ(flag_name(12), "unknown");
 }
 
 // --- pictures ---

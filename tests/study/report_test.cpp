@@ -108,8 +108,8 @@ TEST(RunReport, LongRunsAreThinnedAndKeepTheirExtremes) {
     s.time.push_back(t);
     s.distance.push_back(1e-5 * static_cast<double>(i));
     s.normal.push_back(i == 123456 ? 9.75 : 1.0 + 0.3 * std::sin(t));
-    for (auto* column : {&s.force, &s.tangential, &s.followed, &s.relief, &s.direction_error, &s.work, &s.stored,
-                         &s.follow, &s.update})
+    for (auto* column : {&s.force, &s.tangential, &s.friction, &s.texture, &s.followed, &s.relief, &s.direction_error,
+                         &s.work, &s.stored, &s.follow, &s.update})
       column->push_back(0.1 * std::cos(t));
     s.near_step.push_back(0);
     s.stroking.push_back(1);

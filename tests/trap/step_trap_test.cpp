@@ -251,6 +251,65 @@ TEST(VolumeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   }
 }
 
+/// A ball of 30 mm with every kind of feature, an anisotropic friction law and a map of coefficients.
+Scene fine_scene(FrictionKind friction, IntermediateSurface by, Formulation formulation) {
+  static const auto mesh =
+      std::make_shared<const MeshSurface>(TriangleIndex::build(TriangleMesh::build(icosphere(4, 0.03)).value()));
+  constexpr double around = 2.0 * 3.141592653589793 * 0.03;
+  FeatureMappingSettings mapping;
+  mapping.surface = by;
+  if (by == IntermediateSurface::cylinder || by == IntermediateSurface::sphere) mapping.radius = 0.03;
+  if (by == IntermediateSurface::box) mapping.half_extent = Vec3::Constant(0.03);
+  FineSettings settings;
+  settings.mapping = FeatureMapping::build(mapping).value();
+  settings.formulation = formulation;
+  for (const FeatureKind kind :
+       {FeatureKind::grating, FeatureKind::grid, FeatureKind::triangular, FeatureKind::serrated, FeatureKind::noise}) {
+    FeatureSpec spec;
+    spec.kind = kind;
+    if (kind == FeatureKind::noise) {
+      spec.roughness = 20e-6;
+      spec.correlation_length = 1e-3;
+      spec.period = {around, around};
+    } else {
+      spec.amplitude = 20e-6;
+      spec.wavelength = {around / 60.0, kind == FeatureKind::grid ? around / 40.0 : 0.0};
+    }
+    settings.texture.push_back(SurfaceFeature::build(spec).value());
+  }
+  settings.lay.still_ratio = settings.lay.sliding_ratio = 0.5;
+  settings.lay.formulation = formulation;
+  settings.friction_map.factors = std::make_shared<const HeightMap>(
+      HeightMap::build({0.5F, 1.0F, 1.0F, 0.5F}, 2, 2, Wrap::repeat, Reconstruction::quadratic_bspline).value());
+  settings.friction_map.tile = Vec2::Constant(around / 8.0);
+  Instance instance;
+  instance.name = "ball";
+  instance.surface = mesh;
+  instance.sides = Sides::front;
+  instance.fine = std::make_shared<const FineFeatures>(FineFeatures::build(std::move(settings)).value());
+  instance.material.static_friction = 0.3;
+  instance.material.dynamic_friction = 0.2;
+  instance.material.friction.kind = friction;
+  instance.material.friction.formulation = formulation;
+  instance.material.friction_named = true;
+  return Scene::build({instance}, 0.0).value();
+}
+
+TEST(FineTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
+#if defined(ASPERITY_SANITIZED)
+  GTEST_SKIP() << "sanitizers replace the same functions";
+#endif
+  for (const std::string& name : friction_names()) {
+    for (const IntermediateSurface by : {IntermediateSurface::plane, IntermediateSurface::cylinder,
+                                         IntermediateSurface::sphere, IntermediateSurface::box}) {
+      for (const Formulation formulation : {Formulation::literal, Formulation::consistent}) {
+        const Scene scene = fine_scene(friction_by_name(name).value(), by, formulation);
+        expect_clean(name.c_str(), 1500, 0.0, [&](int) -> const Scene& { return scene; });
+      }
+    }
+  }
+}
+
 class StepTrap : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {

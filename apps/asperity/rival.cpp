@@ -1,0 +1,211 @@
+#include "apps/asperity/rival.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "asperity/core/suggest.h"
+#include "asperity/study/follow.h"
+
+namespace asperity::program {
+namespace {
+
+/// Surface kinds that a law's name may start with.
+constexpr const char* kinds[] = {"mesh", "relief", "implicit"};
+constexpr const char* literal_suffix = "-literal";
+
+Error unknown(const std::string& word, const std::vector<std::string>& accepted) {
+  std::string list;
+  for (const std::string& known : accepted) list += (list.empty() ? "" : ", ") + known;
+  const std::string near = nearest_name(word, accepted);
+  return Error{ErrorCode::bad_value,
+               fmt::format("\"+{}\" means nothing{}", word, near.empty() ? "" : "; did you mean \"+" + near + "\"?"),
+               {},
+               "--laws",
+               "after a law and \"+\": " + list};
+}
+
+/// The part of the word before "-literal", and whether that was there.
+std::pair<std::string, Formulation> split(const std::string& word) {
+  const std::string suffix = literal_suffix;
+  if (!word.ends_with(suffix)) return {word, Formulation::consistent};
+  return {word.substr(0, word.size() - suffix.size()), Formulation::literal};
+}
+
+Error nothing_there(const std::string& word, const std::string& what, const std::string& name) {
+  return Error{ErrorCode::bad_value, fmt::format("\"+{}\": nothing in this scene has {}", word, what), name, "--laws",
+               "a scene with " + what};
+}
+
+/// The instance's fine features as the settings say. False where it has none.
+template <class Change>
+Result<bool> change_fine(Instance& instance, Change&& change) {
+  if (instance.fine == nullptr) return false;
+  FineSettings settings = instance.fine->settings();
+  if (!change(settings)) return false;
+  ASPERITY_TRY(FineFeatures fine, FineFeatures::build(std::move(settings)));
+  instance.fine = std::make_shared<const FineFeatures>(std::move(fine));
+  return true;
+}
+
+Result<bool> change(Instance& instance, const std::string& word) {
+  const auto [stem, formulation] = split(word);
+  if (stem == "no-friction") {
+    instance.material.static_friction = instance.material.dynamic_friction = 0.0;
+    instance.material.friction = {};
+    ASPERITY_CHECK(change_fine(instance, [](FineSettings& fine) {
+      fine.micro.clear();
+      fine.lay = {};
+      fine.friction_map = {};
+      return true;
+    }));
+    return true;
+  }
+  const Formulation as = formulation;
+  if (stem == "texture") {
+    return change_fine(instance, [as](FineSettings& fine) {
+      fine.formulation = as;
+      return fine.source == TextureSource::coat || !fine.texture.empty();
+    });
+  }
+  if (stem == "no-texture") {
+    return change_fine(instance, [](FineSettings& fine) {
+      const bool any = fine.source == TextureSource::coat || !fine.texture.empty();
+      fine.source = TextureSource::features;
+      fine.texture.clear();
+      return any;
+    });
+  }
+  if (stem == "lay") {
+    return change_fine(instance, [as](FineSettings& fine) {
+      fine.lay.formulation = as;
+      return fine.lay.still_ratio < 1.0 || fine.lay.sliding_ratio < 1.0 || !fine.micro.empty();
+    });
+  }
+  ASPERITY_TRY(const FrictionKind kind, friction_by_name(stem));
+  FrictionLaw& law = instance.material.friction;
+  if (law.kind != kind) {
+    // What the scene says of its own law means nothing to another one, but for what both read.
+    FrictionLaw other;
+    other.kind = kind;
+    const std::vector<std::string>& reads = friction_parameters(kind);
+    const auto keep = [&](const char* name, double FrictionLaw::*member) {
+      if (std::find(reads.begin(), reads.end(), name) != reads.end()) other.*member = law.*member;
+    };
+    keep("stiffness", &FrictionLaw::stiffness);
+    keep("damping", &FrictionLaw::damping);
+    keep("viscosity", &FrictionLaw::viscosity);
+    keep("break_away", &FrictionLaw::break_away);
+    keep("stick_speed", &FrictionLaw::stick_speed);
+    keep("stribeck_speed", &FrictionLaw::stribeck_speed);
+    law = other;
+  }
+  law.formulation = formulation;
+  if (formulation == Formulation::literal) {
+    // What the printed forms do not have.
+    if (kind == FrictionKind::karnopp) law.damping = 0.0;
+    if (kind == FrictionKind::coulomb) law.stick_speed = FrictionLaw{}.stick_speed;
+  }
+  instance.material.friction_named = true;
+  return true;
+}
+
+const char* needed_by(const std::string& word) {
+  const std::string stem = split(word).first;
+  return stem == "lay" ? "friction that depends on the direction" : "a texture";
+}
+
+}  // namespace
+
+const std::vector<std::string>& fine_words() {
+  static const std::vector<std::string> words = [] {
+    std::vector<std::string> all{"no-friction", "texture", "texture-literal", "no-texture", "lay", "lay-literal"};
+    for (const std::string& name : friction_names()) {
+      all.push_back(name);
+      all.push_back(name + literal_suffix);
+    }
+    return all;
+  }();
+  return words;
+}
+
+Result<Rival> parse_rival(const std::string& name) {
+  Rival rival;
+  rival.name = name;
+  std::string rest = name;
+  for (const char* kind : kinds) {
+    const std::string prefix = std::string(kind) + "/";
+    if (!name.starts_with(prefix)) continue;
+    rival.kind = kind;
+    rest = name.substr(prefix.size());
+  }
+  std::size_t plus = rest.find('+');
+  rival.law = rest.substr(0, plus);
+  while (plus != std::string::npos) {
+    const std::size_t next = rest.find('+', plus + 1);
+    const std::string word = rest.substr(plus + 1, next == std::string::npos ? next : next - plus - 1);
+    const std::vector<std::string>& words = fine_words();
+    if (std::find(words.begin(), words.end(), word) == words.end()) return unknown(word, words);
+    rival.fine.push_back(word);
+    plus = next;
+  }
+  return rival;
+}
+
+Result<Experiment> felt_by(const Experiment& experiment, const Rival& rival) {
+  Experiment felt = experiment;
+  if (!rival.law.empty()) {
+    Result<Law> law = law_by_name(rival.law);
+    if (!law) return std::move(law).error().at("--laws");
+    const auto instances = experiment.scene.instances();
+    const bool own = std::all_of(instances.begin(), instances.end(),
+                                 [&](const Instance& i) { return law_name(i.law) == rival.law; });
+    if (!own) {
+      ASPERITY_TRY(felt, with_law(experiment, *law));
+    }
+  }
+  if (rival.fine.empty()) return felt;
+  std::vector<Instance> instances(felt.scene.instances().begin(), felt.scene.instances().end());
+  for (const std::string& word : rival.fine) {
+    bool any = false;
+    for (Instance& instance : instances) {
+      ASPERITY_TRY(const bool changed, change(instance, word));
+      any = any || changed;
+    }
+    if (!any) return nothing_there(word, needed_by(word), experiment.name);
+  }
+  std::vector<FieldEffect> effects(felt.scene.effects().begin(), felt.scene.effects().end());
+  ASPERITY_TRY(felt.scene, Scene::build(std::move(instances), felt.scene.probe_radius(), std::move(effects)));
+  return felt;
+}
+
+std::vector<std::string> default_rivals(const Scene& scene) {
+  if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
+  for (const Instance& instance : scene.instances()) {
+    const std::string law = law_name(instance.law);
+    if (instance.fine != nullptr && instance.fine->has_texture())
+      return {law + "+texture", law + "+texture-literal", law + "+no-texture"};
+    if (instance.fine != nullptr && instance.fine->shapes_friction()) return {law + "+lay", law + "+lay-literal"};
+    if (instance.material.friction_named) {
+      return {law + "+implicit-coulomb",  law + "+karnopp", law + "+karnopp-literal", law + "+dahl",
+              law + "+hayward-armstrong", law + "+lugre",   law + "+coulomb"};
+    }
+    if (parametric_of(instance.surface) != nullptr) return {"proxy"};
+    if (std::holds_alternative<MagneticLaw>(instance.law)) return {"magnetic", "magnetic-literal", "proxy"};
+    if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
+      if (implicit->mesh() == nullptr)
+        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "avila"};
+      if (implicit->textured())
+        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "normal-perturbation"};
+      return {
+          "mesh/proxy", "mesh/force-shading-literal", "proxy", "virtual-contact-point", "virtual-contact-point-literal",
+          "avila"};
+    }
+    if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
+  }
+  return {"proxy", "mesostructure", "height-field", "force-shading"};
+}
+
+}  // namespace asperity::program

@@ -1,0 +1,125 @@
+// Friction of a material in a scene file: its law, its lay, its map.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "asperity/io/scene_fine.h"
+#include "asperity/io/scene_heights.h"
+
+namespace asperity {
+namespace {
+
+const std::vector<std::string>& formulation_names() {
+  static const std::vector<std::string> names{"literal", "consistent"};
+  return names;
+}
+
+/// Reads the members that the law takes; others are refused by name.
+class FrictionReader {
+ public:
+  FrictionReader(ObjectReader& reader, FrictionKind kind) : reader_(reader) { law_.kind = kind; }
+
+  FrictionLaw read() {
+    for (const SceneObjectKeys& entry : scene_object_keys()) {
+      if (entry.object != "friction") continue;
+      for (const std::string& key : entry.keys) {
+        if (key != "law" && !takes(key) && !(key == "formulation" && printed_otherwise()))
+          reader_.refuse({key}, fmt::format("by the friction law \"{}\"", friction_name(law_.kind)));
+      }
+    }
+    if (printed_otherwise())
+      law_.formulation = static_cast<Formulation>(reader_.choice("formulation", formulation_names(), 1));
+    number("stiffness", Dimension::stiffness, Range::not_negative(), law_.stiffness);
+    number("damping", Dimension::damping, Range::not_negative(), law_.damping);
+    number("viscosity", Dimension::damping, Range::not_negative(), law_.viscosity);
+    number("break_away", Dimension::force, Range::not_negative(), law_.break_away);
+    number("stick_speed", Dimension::speed, Range::positive(), law_.stick_speed);
+    number("stribeck_speed", Dimension::speed, Range::positive(), law_.stribeck_speed);
+    number("exponent", Dimension::ratio, Range{0.5, 4.0}, law_.exponent);
+    number("adhesion", Dimension::ratio, Range{0.0, 0.9}, law_.adhesion);
+    return law_;
+  }
+
+ private:
+  [[nodiscard]] bool takes(const std::string& key) const {
+    const auto& taken = friction_parameters(law_.kind);
+    return std::find(taken.begin(), taken.end(), key) != taken.end();
+  }
+  /// Whether the literal form is another one.
+  [[nodiscard]] bool printed_otherwise() const {
+    return law_.kind == FrictionKind::karnopp || law_.kind == FrictionKind::coulomb || law_.kind == FrictionKind::lugre;
+  }
+  void number(const char* key, Dimension dimension, const Range& range, double& value) {
+    if (takes(key)) value = reader_.quantity(key, dimension, value, range);
+  }
+
+  ObjectReader& reader_;
+  FrictionLaw law_;
+};
+
+Status read_law(const SceneJson& json, ObjectReader& material, Material& into) {
+  if (!json.is_string() && !json.is_object()) {
+    material.fail_type("friction", json, "a friction law's name, or an object with a law");
+    return material.status();
+  }
+  const SceneJson wrapped = json.is_string() ? SceneJson{{"law", json}} : json;
+  ObjectReader reader(wrapped, material.place_of("friction"), "friction");
+  if (!reader.failed() && !reader.has("law")) reader.fail("law", "is missing", "a friction law's name");
+  const std::size_t kind = reader.choice("law", friction_names(), 0);
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(const FrictionKind known, friction_by_name(friction_names()[kind]));
+  into.friction = FrictionReader(reader, known).read();
+  into.friction_named = true;
+  ASPERITY_CHECK(reader.status());
+  if (auto valid = validate(into.friction); !valid) return std::move(valid).error().at(reader.place());
+  material.take("friction", std::move(reader));
+  return success();
+}
+
+void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
+  ObjectReader reader(json, material.place_of("lay"), "lay");
+  lay.still_ratio = reader.quantity("still_ratio", Dimension::ratio, 1.0, Range{0.0, 1.0});
+  lay.sliding_ratio = reader.quantity("sliding_ratio", Dimension::ratio, lay.still_ratio, Range{0.0, 1.0});
+  lay.formulation = static_cast<Formulation>(reader.choice("formulation", formulation_names(), 1));
+  lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
+  material.take("lay", std::move(reader));
+}
+
+Result<FrictionMap> read_friction_map(const SceneJson& json, ObjectReader& material, SceneContext& context) {
+  ObjectReader reader(json, material.place_of("friction_map"), "friction map");
+  ASPERITY_CHECK(reader.status());
+  HeightSourceReader source(reader, context, "image", "friction map", 0.0);
+  ASPERITY_CHECK(source.read_source());
+  const double low = reader.number("low", 0.0, Range{0.0, 1e3});
+  const double high = reader.number("high", 1.0, Range{0.0, 1e3});
+  FrictionMap map;
+  if (!reader.has("tile")) reader.fail("tile", "is missing", "size of one repeat: a length above 0, or two");
+  map.tile = reader.pair("tile", Dimension::length, map.tile, Range::positive());
+  ASPERITY_CHECK(reader.status());
+  // Nothing between two factors may lie outside them.
+  ASPERITY_TRY(HeightMap factors, source.build_between(low, high, Wrap::repeat, Reconstruction::bilinear));
+  map.factors = std::make_shared<const HeightMap>(std::move(factors));
+  material.take("friction_map", std::move(reader));
+  return map;
+}
+
+}  // namespace
+
+Result<FinePart> read_friction(ObjectReader& material, SceneContext& context, Material& into) {
+  ASPERITY_CHECK(material.status());
+  FinePart part;
+  if (const SceneJson* friction = material.raw("friction")) ASPERITY_CHECK(read_law(*friction, material, into));
+  if (const SceneJson* lay = material.raw("lay")) {
+    part.lay_given = true;
+    read_lay(*lay, material, part.lay);
+  }
+  ASPERITY_CHECK(material.status());
+  if (const SceneJson* map = material.raw("friction_map")) {
+    ASPERITY_TRY(part.friction_map, read_friction_map(*map, material, context));
+  }
+  ASPERITY_CHECK(material.status());
+  return part;
+}
+
+}  // namespace asperity

@@ -1,0 +1,78 @@
+#pragma once
+// Heights of a scene: an image or a formula, and what its grey means. Coats, features and friction maps read them.
+// Internal to io.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "asperity/field/height_map.h"
+#include "asperity/field/mesostructure_generators.h"
+#include "asperity/io/scene_reader.h"
+
+namespace asperity {
+
+/// What a JSON file beside a measured height image says of it (m).
+struct HeightSidecar {
+  std::string file;
+  int width = 0;
+  int height = 0;
+  double low = 0.0;
+  double high = 0.0;
+  Vec2 pixel = Vec2::Zero();
+};
+
+/// Heights from black to white (m), before magnifying.
+struct HeightScale {
+  double amplitude = 0.0;
+  double offset = 0.0;
+};
+
+/// Reads where heights come from, then what they measure, then makes the map. [build]
+class HeightSourceReader {
+ public:
+  /// `key` holds the image or the formula. `who` begins notes. `mean_edge`: of the mesh (m), which heights may be
+  /// shares of; 0: there is none.
+  HeightSourceReader(ObjectReader& reader, SceneContext& context, std::string key, std::string who, double mean_edge)
+      : reader_(reader), context_(context), key_(std::move(key)), who_(std::move(who)), mean_edge_(mean_edge) {}
+
+  /// Reads `key` and `channel`.
+  Status read_source();
+  /// Reads `white_is`, `height`, `offset` and `height_range`.
+  Status read_scale(double magnify);
+  /// The heights of the scale that was read.
+  Result<HeightMap> build(Wrap wrap, Reconstruction reconstruction) const;
+  /// Values from `black` to `white` in place of heights.
+  Result<HeightMap> build_between(double black, double white, Wrap wrap, Reconstruction reconstruction) const;
+
+  [[nodiscard]] const std::optional<HeightSidecar>& sidecar() const { return sidecar_; }
+
+ private:
+  void read_generator(const SceneJson& json);
+  Status read_image_source(const std::string& file);
+  Status read_sidecar();
+  [[nodiscard]] Result<double> height_of(const SceneJson& value, const std::string& place, const Range& range) const;
+  [[nodiscard]] std::string accepted_height(const Range& range) const;
+  double read_height(const char* key, double fallback, const Range& range);
+  void read_range(const SceneJson& range);
+  [[nodiscard]] Result<HeightMap> image_heights(const HeightMapSettings& settings) const;
+  [[nodiscard]] Result<HeightMap> generated_heights(double amplitude, double offset, Wrap wrap,
+                                                    Reconstruction reconstruction) const;
+
+  ObjectReader& reader_;
+  SceneContext& context_;
+  std::string key_;
+  std::string who_;
+  double mean_edge_ = 0.0;
+  bool generated_ = false;
+  MesostructureSpec spec_;
+  std::filesystem::path path_;
+  Image image_;
+  Channel channel_ = Channel::automatic;
+  bool white_is_deep_ = false;
+  std::optional<HeightSidecar> sidecar_;
+  double magnify_ = 1.0;
+  HeightScale scale_;
+};
+
+}  // namespace asperity

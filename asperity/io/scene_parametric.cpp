@@ -1,0 +1,84 @@
+// A surface given by a formula, in a scene file.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "asperity/io/scene_fine.h"
+
+namespace asperity {
+namespace {
+
+/// Reads the members that the shape takes; others are refused by name.
+Result<ParametricSettings> read_shape(ObjectReader& surface) {
+  const SceneJson& json = *surface.raw("parametric");
+  ObjectReader reader(json, surface.place_of("parametric"), "parametric");
+  if (!reader.failed() && !reader.has("shape")) reader.fail("shape", "is missing", "a shape's name");
+  const std::size_t shape = reader.choice("shape", parametric_names(), 0);
+  ASPERITY_CHECK(reader.status());
+  ParametricSettings settings;
+  ASPERITY_TRY(settings.shape, parametric_by_name(parametric_names()[shape]));
+  const auto& taken = parametric_parameters(settings.shape);
+  const auto takes = [&](const std::string& key) { return std::find(taken.begin(), taken.end(), key) != taken.end(); };
+  for (const SceneObjectKeys& entry : scene_object_keys()) {
+    if (entry.object != "parametric") continue;
+    for (const std::string& key : entry.keys) {
+      if (key != "shape" && !takes(key))
+        reader.refuse({key}, fmt::format("by the shape \"{}\"", parametric_name(settings.shape)));
+    }
+  }
+  const auto length = [&](const char* key, double& value) {
+    if (takes(key)) value = reader.quantity(key, Dimension::length, value, Range::positive());
+  };
+  length("width", settings.width);
+  length("depth", settings.depth);
+  length("radius", settings.radius);
+  length("tube", settings.tube);
+  length("height", settings.height);
+  if (takes("neck")) settings.neck = reader.quantity("neck", Dimension::ratio, settings.neck, Range{0.05, 0.95});
+  length("scale", settings.scale);
+  surface.take("parametric", std::move(reader));
+  ASPERITY_CHECK(surface.status());
+  return settings;
+}
+
+Result<ParametricSurface> build_shape(const ParametricSettings& settings, const std::string& place) {
+  Result<ParametricSurface> surface = ParametricSurface::build(settings);
+  if (!surface) return std::move(surface).error().at(place);
+  return surface;
+}
+
+}  // namespace
+
+Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& context, Instance& instance,
+                       TexturePart& texture) {
+  static const std::vector<std::string> sides{"auto", "front", "both"};
+  surface.refuse(
+      {"mesh", "volume", "iso", "implicit", "units", "fit", "search", "coat", "on_overlap", "shell_directions"},
+      "beside a parametric surface");
+  ASPERITY_CHECK(surface.status());
+  const std::string place = surface.place_of("parametric");
+  ASPERITY_TRY(ParametricSettings settings, read_shape(surface));
+  instance.name = surface.text("name", parametric_name(settings.shape));
+  ASPERITY_CHECK(surface.status());
+  ASPERITY_TRY(ParametricSurface shape, build_shape(settings, place));
+  switch (surface.choice("sides", sides, 0)) {
+    case 1: instance.sides = Sides::front; break;
+    case 2: instance.sides = Sides::both; break;
+    default: instance.sides = shape.natural_sides(); break;
+  }
+  TextureHost host;
+  host.name = instance.name;
+  host.bounds = shape.bounds();
+  host.parametric = &shape;
+  ASPERITY_TRY(texture, read_texture(surface, host, law, context));
+  if (!texture.geometry.empty()) {
+    settings.features = texture.geometry;
+    settings.tile = texture.fine.mapping.settings().tile;
+    ASPERITY_TRY(shape, build_shape(settings, surface.place_of("texture.features")));
+  }
+  instance.surface = std::make_shared<const ParametricSurface>(std::move(shape));
+  return surface.status();
+}
+
+}  // namespace asperity

@@ -1,0 +1,137 @@
+// What friction laws are called, which parameters they read and what those may be.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "asperity/core/suggest.h"
+#include "asperity/material/friction.h"
+
+namespace asperity {
+
+namespace {
+
+struct KindEntry {
+  FrictionKind kind;
+  const char* name;
+  std::vector<std::string> parameters;
+};
+
+const std::array<KindEntry, 7>& kinds() {
+  static const std::array<KindEntry, 7> entries{{
+      {FrictionKind::implicit_coulomb, "implicit-coulomb", {"stiffness", "damping", "break_away"}},
+      {FrictionKind::viscous, "viscous", {"viscosity"}},
+      {FrictionKind::coulomb, "coulomb", {"viscosity", "stick_speed"}},
+      {FrictionKind::karnopp, "karnopp", {"stiffness", "damping", "viscosity", "break_away", "stick_speed"}},
+      {FrictionKind::dahl, "dahl", {"stiffness", "exponent"}},
+      {FrictionKind::hayward_armstrong, "hayward-armstrong", {"stiffness", "adhesion"}},
+      {FrictionKind::lugre, "lugre", {"stiffness", "damping", "viscosity", "break_away", "stribeck_speed"}},
+  }};
+  return entries;
+}
+
+const KindEntry& entry_of(FrictionKind kind) {
+  for (const KindEntry& entry : kinds())
+    if (entry.kind == kind) return entry;
+  return kinds().front();
+}
+
+struct Parameter {
+  const char* name;
+  double FrictionLaw::*member;
+  double least;
+  bool above;  ///< `least` itself is not accepted
+  double most;
+  const char* accepted;
+};
+
+constexpr double no_limit = std::numeric_limits<double>::max();
+constexpr std::array<Parameter, 8> all_parameters{{
+    {"stiffness", &FrictionLaw::stiffness, 0.0, false, no_limit,
+     "a stiffness above 0 (N/m, N/mm), or 0 for the contact's own"},
+    {"damping", &FrictionLaw::damping, 0.0, false, no_limit, "a damping of 0 or more (N·s/m)"},
+    {"viscosity", &FrictionLaw::viscosity, 0.0, false, no_limit, "a viscosity of 0 or more (N·s/m)"},
+    {"break_away", &FrictionLaw::break_away, 0.0, false, no_limit,
+     "a force above 0 (N), or 0 for the static coefficient times the push"},
+    {"stick_speed", &FrictionLaw::stick_speed, 0.0, true, no_limit, "a speed above 0 (m/s, mm/s)"},
+    {"stribeck_speed", &FrictionLaw::stribeck_speed, 0.0, true, no_limit, "a speed above 0 (m/s, mm/s)"},
+    {"exponent", &FrictionLaw::exponent, 0.5, false, 4.0, "0.5 to 4"},
+    {"adhesion", &FrictionLaw::adhesion, 0.0, false, 0.9, "0 to 0.9"},
+}};
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+}  // namespace
+
+const char* friction_name(FrictionKind kind) {
+  return entry_of(kind).name;
+}
+
+const std::vector<std::string>& friction_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const KindEntry& entry : kinds()) all.emplace_back(entry.name);
+    return all;
+  }();
+  return names;
+}
+
+Result<FrictionKind> friction_by_name(std::string_view name) {
+  for (const KindEntry& entry : kinds())
+    if (name == entry.name) return entry.kind;
+  const std::string near = nearest_name(name, friction_names());
+  return Error{
+      ErrorCode::bad_value,
+      fmt::format("\"{}\" is no friction law{}", name, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+      {},
+      {},
+      listed(friction_names())};
+}
+
+const std::vector<std::string>& friction_parameters(FrictionKind kind) {
+  return entry_of(kind).parameters;
+}
+
+Status validate(const FrictionLaw& law) {
+  const FrictionLaw plain;
+  const std::vector<std::string>& read = friction_parameters(law.kind);
+  for (const Parameter& parameter : all_parameters) {
+    const double value = law.*parameter.member;
+    const bool reads = std::find(read.begin(), read.end(), parameter.name) != read.end();
+    if (!reads && value != plain.*parameter.member) {
+      return Error{ErrorCode::bad_value,
+                   fmt::format("is not read by the friction law {}", friction_name(law.kind)),
+                   {},
+                   parameter.name,
+                   listed(read)};
+    }
+    const bool low = parameter.above ? !(value > parameter.least) : !(value >= parameter.least);
+    if (low || !(value <= parameter.most))
+      return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, parameter.name, parameter.accepted};
+  }
+  if (law.kind == FrictionKind::karnopp && law.formulation == Formulation::literal && law.damping > 0.0) {
+    return Error{ErrorCode::bad_value,
+                 "is the consistent form's: the printed spring has none",
+                 {},
+                 "damping",
+                 "0, or formulation \"consistent\""};
+  }
+  if (law.kind == FrictionKind::coulomb && law.formulation == Formulation::literal &&
+      law.stick_speed != plain.stick_speed) {
+    return Error{ErrorCode::bad_value,
+                 "is the consistent form's: the literal one jumps at rest",
+                 {},
+                 "stick_speed",
+                 "formulation \"consistent\""};
+  }
+  return success();
+}
+
+}  // namespace asperity

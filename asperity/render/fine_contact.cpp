@@ -1,0 +1,352 @@
+#include "asperity/render/fine_contact.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace asperity {
+
+namespace {
+
+const ReliefSurface* relief_of(const Instance& instance) noexcept {
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  return relief != nullptr ? relief->get() : nullptr;
+}
+
+/// Where the contact lies in the plane of the features.
+void place_contact(const Instance& instance, std::uint32_t element, const Vec3& point, const Hint& hint,
+                   MappedPlaces& out) noexcept {
+  const FeatureMapping& mapping = instance.fine->settings().mapping;
+  if (mapping.settings().surface != IntermediateSurface::uv) {
+    mapping.map(point, out);
+    return;
+  }
+  if (const ParametricSurface* surface = parametric_of(instance.surface)) {
+    const Vec2& tile = mapping.settings().tile;
+    MappedPlace place;
+    place.uv = hint.parametric.uv.cwiseProduct(tile);
+    ParametricSurface::parameter_gradients(surface->jet(hint.parametric.uv), place.du, place.dv);
+    place.du *= tile.x();
+    place.dv *= tile.y();
+    out.push_back(place);
+    return;
+  }
+  const MeshSurface* mesh = base_of(instance.surface);
+  if (mesh != nullptr && element < mesh->mesh().triangles().size())
+    out.push_back(mapping.on_mesh(mesh->mesh(), element, point));
+}
+
+/// Erratum c as printed: on the ramp the angle is counted once more, by the height that grows with it.
+void count_angle_twice(const Instance& instance, const Hint& hint, MappedPlaces& places) noexcept {
+  const FeatureMappingSettings& mapping = instance.fine->settings().mapping.settings();
+  const ParametricSurface* surface = parametric_of(instance.surface);
+  if (surface == nullptr || mapping.surface != IntermediateSurface::cylinder) return;
+  const double rise = surface->printed_rise(hint.parametric.uv);
+  for (MappedPlace& place : places) place.du += mapping.radius * rise * mapping.axis;
+}
+
+/// Height of a texture over its surface and the height's gradient in space.
+struct TextureSample {
+  double height = 0.0;           ///< m
+  Vec3 gradient = Vec3::Zero();  ///< m/m
+  bool faded = false;
+};
+
+/// How much of a feature is felt at a place whose coordinates have these gradients along the surface, at a `velocity`
+/// along it.
+double felt_share(const SurfaceFeature& feature, const MappedPlace& place, const Vec3& du, const Vec3& dv,
+                  const Vec3& velocity, Seconds dt, double resolution) noexcept {
+  constexpr double whole_from = 4.0;  // steps a wavelength, as texture_share has it
+  const double wavelength = feature.wavelength();
+  const Vec2 across = feature.across(place.uv);
+  // How many metres of feature a metre of surface passes, and how many the probe passes in a second.
+  double density = 0.0;
+  double passed = 0.0;
+  if (!across.isZero()) {
+    const Vec3 wave = across.x() * du + across.y() * dv;
+    density = wave.squaredNorm();
+    passed = std::abs(velocity.dot(wave));
+  } else {
+    density = std::max(du.squaredNorm(), dv.squaredNorm());
+    passed = std::sqrt(density * velocity.squaredNorm());
+  }
+  const double finest = whole_from * resolution;
+  if (wavelength >= whole_from * passed * dt.count() && wavelength * wavelength >= finest * finest * density)
+    return 1.0;
+  const double root = std::sqrt(density);
+  return texture_share(wavelength / root, passed / root, dt, resolution);
+}
+
+TextureSample sample_features(const FineSettings& fine, const MappedPlaces& places, const Vec3& normal,
+                              const FineMotion& motion, double resolution) noexcept {
+  TextureSample out;
+  const Vec3 along = surface_gradient(motion.velocity, normal);
+  for (const MappedPlace& place : places) {
+    double height = 0.0;
+    Vec2 gradient = Vec2::Zero();
+    const Vec3 du = surface_gradient(place.du, normal);
+    const Vec3 dv = surface_gradient(place.dv, normal);
+    for (const SurfaceFeature& feature : fine.texture) {
+      const double share = felt_share(feature, place, du, dv, along, motion.dt, resolution);
+      out.faded = out.faded || share < 1.0;
+      if (share == 0.0) continue;
+      const FeatureSample here = feature.sample(place.uv);
+      height += share * here.height;
+      gradient += share * here.gradient;
+    }
+    out.height += place.weight * height;
+    out.gradient += place.weight * (gradient.x() * place.du + gradient.y() * place.dv) + height * place.dweight;
+  }
+  return out;
+}
+
+/// The coat of a mesh that is felt as its bare base: heights as they are blended over its edges, or the slope that its
+/// normal map draws.
+TextureSample sample_coat(const ReliefSurface& relief, Formulation formulation, std::uint32_t element,
+                          const Vec3& point, ReliefFrame& cached) noexcept {
+  TextureSample out;
+  const TriangleMesh& mesh = relief.base().mesh();
+  if (element >= mesh.triangles().size()) return out;
+  const BarycentricFrame frame = barycentric_frame(mesh, element);
+  const Vec3 place = frame.coordinates(point);
+  if (formulation == Formulation::literal) {
+    const CoatSample coat = relief.coat().sample(mesh, element, place);
+    constexpr double least_rise = 0.1;  // a normal that lies flat has no slope
+    const double rise = std::max(least_rise, coat.normal.dot(frame.normal));
+    out.height = coat.height;
+    out.gradient = -(coat.normal - coat.normal.dot(frame.normal) * frame.normal) / rise;
+    return out;
+  }
+  if (cached.owner != relief.base().index().identity() || cached.face != element) cached = relief.frame(element);
+  const HeightJet jet = relief.height(cached, place[1], place[2]);
+  out.height = jet.height;
+  out.gradient = jet.u * frame.gradient[1] + jet.v * frame.gradient[2];
+  return out;
+}
+
+/// What a step of the probe makes of a step along the surface: below a convex surface the foot runs ahead.
+Vec3 at_probe(const Vec3& gradient, const Mat3& bend, double depth) noexcept {
+  if (bend.isZero()) return gradient;
+  const Mat3 shrink = Mat3::Identity() - depth * bend;
+  constexpr double least = 0.05;  // nearer to the centre of the bend the foot means nothing
+  return shrink.determinant() > least ? Vec3(shrink.inverse() * gradient) : gradient;
+}
+
+/// Eq. 12.
+void add_printed_texture(const TextureSample& texture, LawForce& law) noexcept {
+  law.texture = -law.push * texture.gradient;
+  law.force += law.texture;
+  law.height = texture.height;
+}
+
+/// What the texture may still give (0 to 1): its force is the slope of one potential, but a foot that jumps, a relief
+/// below, or a share that changes with speed would let it give more than it took.
+double giving(const TextureState& state, const Vec3& texture, double stiffness, const Vec3& moved) noexcept {
+  constexpr double free_credit = 1e-6;  // J
+  if (state.book >= 0.0 || texture.dot(moved) <= 0.0) return 1.0;
+  // A spring held over a tick is off by this much by itself.
+  const double credit = free_credit + 0.5 * stiffness * moved.squaredNorm();
+  return std::clamp(2.0 + state.book / credit, 0.0, 1.0);
+}
+
+/// Slope of k p^2 / 2 with p the penetration to the relief, whose crests lie on the surface. False: the relief is not
+/// touched.
+bool add_relief_texture(const TextureSample& texture, double highest, double stiffness, const Vec3& moved,
+                        TextureState& state, LawForce& law) noexcept {
+  constexpr double most_credit = 1e-5;  // J
+  const double depth = law.push / stiffness;
+  const double penetration = depth + std::min(0.0, texture.height - highest);
+  law.height = texture.height - highest;
+  if (!(penetration > 0.0)) return false;
+  const double push = stiffness * penetration;
+  const Vec3 slope = at_probe(surface_gradient(texture.gradient, law.normal), law.bend, depth);
+  const Vec3 relief = push * (law.normal - slope);
+  const double potential = 0.5 * push * penetration;
+  Vec3 added = relief - law.push * law.normal;
+  if (state.held) {
+    // Trapezoidal: what the field itself gives, not what holding a force over a tick adds.
+    const double gave = 0.5 * (state.force + relief).dot(moved) + potential - state.potential;
+    state.book = std::min(most_credit, state.book - gave);
+    const double share = giving(state, added, stiffness, moved);
+    state.book += 0.5 * (1.0 - share) * added.dot(moved);
+    added *= share;
+  }
+  state.held = true;
+  state.force = law.push * law.normal + added;
+  state.potential = potential;
+  law.texture = added;
+  law.force += added;
+  // Damping was measured against the constraint's whole push.
+  const double along = law.force.dot(law.normal);
+  if (along < 0.0) law.force -= along * law.normal;
+  law.push = push;
+  law.penetration = penetration;
+  return true;
+}
+
+void add_friction(const Instance& instance, const Material& material, double stiffness, const MappedPlaces& places,
+                  const FineMotion& motion, ContactState& slot, EnergyTank& tank, LawForce& law) noexcept {
+  FrictionContact contact;
+  contact.normal = law.normal;
+  contact.push = std::max(0.0, law.push);
+  contact.motion = motion.moved;
+  contact.velocity = motion.velocity;
+  contact.stiffness = stiffness;
+  contact.dt = motion.dt;
+  FrictionCoefficients& coefficients = contact.coefficients;
+  coefficients.still = std::max(material.static_friction, material.dynamic_friction);
+  coefficients.sliding = material.dynamic_friction;
+  if (const FineFeatures* fine = instance.fine.get(); fine != nullptr && fine->shapes_friction() && !places.empty()) {
+    const FineSettings& settings = fine->settings();
+    double factor = 1.0;
+    if (settings.friction_map.factors != nullptr) {
+      factor = 0.0;
+      for (const MappedPlace& place : places) {
+        const Vec2 st = place.uv.cwiseQuotient(settings.friction_map.tile);
+        factor += place.weight * std::max(0.0, settings.friction_map.factors->height_at(st));
+      }
+    }
+    const double still_along = factor * coefficients.still * settings.lay.still_ratio + fine->interlock_along();
+    const double sliding_along = factor * coefficients.sliding * settings.lay.sliding_ratio + fine->interlock_along();
+    coefficients.still = factor * coefficients.still + fine->interlock_across();
+    coefficients.sliding = factor * coefficients.sliding + fine->interlock_across();
+    // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
+    const MappedPlace& place = places[0];
+    const Vec2 across = fine->across(place.uv);
+    const Vec3 way = surface_gradient(across.x() * place.du + across.y() * place.dv, law.normal);
+    const double length = way.norm();
+    if (length > 0.0) slot.texture.across = way / length;
+    const Vec3 kept = surface_gradient(slot.texture.across, law.normal);
+    const double rest = kept.norm();
+    if (rest > 0.0) {
+      coefficients.across = kept / rest;
+      coefficients.still_ratio = coefficients.still > 0.0 ? std::min(1.0, still_along / coefficients.still) : 1.0;
+      coefficients.sliding_ratio =
+          coefficients.sliding > 0.0 ? std::min(1.0, sliding_along / coefficients.sliding) : 1.0;
+    }
+    coefficients.formulation = settings.lay.formulation;
+  }
+  const double before = friction_energy(material.friction, stiffness, slot.friction);
+  const Vec3 force = friction_force(material.friction, contact, slot.friction);
+  law.held = friction_energy(material.friction, stiffness, slot.friction);
+  tank.fill(before - law.held - force.dot(motion.moved));
+  law.friction = force;
+  law.force += force;
+}
+
+void let_go(ContactState& slot) noexcept {
+  slot.friction = {};
+  slot.texture = {};
+}
+
+}  // namespace
+
+bool proxy_holds_friction(const Instance& instance) noexcept {
+  if (!std::holds_alternative<ProxyLaw>(instance.law)) return false;
+  if (instance.fine != nullptr && (instance.fine->has_texture() || instance.fine->shapes_friction())) return false;
+  const FrictionLaw& law = instance.material.friction;
+  return law.kind == FrictionKind::implicit_coulomb && law.stiffness == 0.0 && law.damping == 0.0 &&
+         law.break_away == 0.0;
+}
+
+bool adds_friction(const Instance& instance) noexcept {
+  if (std::holds_alternative<ProxyLaw>(instance.law)) return !proxy_holds_friction(instance);
+  return instance.material.friction_named || (instance.fine != nullptr && instance.fine->shapes_friction());
+}
+
+bool add_fine_forces(const Instance& instance, const Material& material, double stiffness, const FineMotion& motion,
+                     ContactState& slot, EnergyTank& tank, LawForce& law) noexcept {
+  if (!law.contact || !(law.push > 0.0)) {
+    let_go(slot);
+    return false;
+  }
+  MappedPlaces places;
+  const FineFeatures* fine = instance.fine.get();
+  bool faded = false;
+  if (fine != nullptr) {
+    const FineSettings& settings = fine->settings();
+    const bool literal = settings.formulation == Formulation::literal;
+    const bool from_coat = settings.source == TextureSource::coat;
+    if (!from_coat || fine->shapes_friction()) place_contact(instance, law.element, law.point, slot.hint, places);
+    if (literal) count_angle_twice(instance, slot.hint, places);
+    if (fine->has_texture()) {
+      const ReliefSurface* relief = relief_of(instance);
+      TextureSample texture;
+      double highest = fine->highest();
+      if (from_coat && relief != nullptr) {
+        texture = sample_coat(*relief, settings.formulation, law.element, law.point, slot.hint.relief.frame);
+        highest = relief->coat().highest();
+      } else {
+        texture = sample_features(settings, places, law.normal, motion, settings.resolution);
+      }
+      faded = texture.faded;
+      if (literal) {
+        add_printed_texture(texture, law);
+      } else if (!add_relief_texture(texture, highest, stiffness, motion.moved, slot.texture, law)) {
+        // In a valley of the relief: nothing is touched.
+        let_go(slot);
+        law.contact = false;
+        return faded;
+      }
+    }
+  }
+  if (adds_friction(instance)) add_friction(instance, material, stiffness, places, motion, slot, tank, law);
+  return faded;
+}
+
+TextureShape texture_at(const Instance& instance, std::uint32_t element, const Vec3& point, const Vec3& normal,
+                        const Hint& hint, double resolution) noexcept {
+  if (instance.fine == nullptr || !instance.fine->has_texture()) return {};
+  const FineSettings& settings = instance.fine->settings();
+  TextureSample texture;
+  double highest = instance.fine->highest();
+  const ReliefSurface* relief = relief_of(instance);
+  if (settings.source == TextureSource::coat && relief != nullptr) {
+    ReliefFrame frame;
+    texture = sample_coat(*relief, settings.formulation, element, point, frame);
+    highest = relief->coat().highest();
+  } else {
+    MappedPlaces places;
+    place_contact(instance, element, point, hint, places);
+    texture = sample_features(settings, places, normal, {}, resolution);
+  }
+  if (settings.formulation == Formulation::literal) highest = 0.0;
+  return {texture.height - highest, surface_gradient(texture.gradient, normal)};
+}
+
+Status check_fine(const Instance& instance, const std::string& place) {
+  if (instance.fine == nullptr) return success();
+  const FineSettings& fine = instance.fine->settings();
+  const auto refuse = [&](std::string what, std::string accepted) {
+    return Error{ErrorCode::unsupported_pair, std::move(what), {}, place + ".texture", std::move(accepted)};
+  };
+  if (fine.source == TextureSource::coat) {
+    if (relief_of(instance) == nullptr)
+      return refuse(fmt::format("takes its heights from a coat, and \"{}\" has none", instance.name),
+                    "\"features\", or a coat on a mesh");
+    if (!std::holds_alternative<GodObjectLaw>(instance.law))
+      return refuse(
+          fmt::format("takes its heights from a coat, which the law \"{}\" feels already", law_name(instance.law)),
+          "the law \"god-object\", which feels the bare mesh");
+  }
+  const bool mapped = !fine.texture.empty() || instance.fine->shapes_friction();
+  if (mapped && fine.mapping.settings().surface == IntermediateSurface::uv &&
+      parametric_of(instance.surface) == nullptr) {
+    const MeshSurface* mesh = base_of(instance.surface);
+    if (mesh == nullptr)
+      return refuse(fmt::format("is mapped by texture coordinates, and \"{}\" has no mesh", instance.name),
+                    "mapping by plane, cylinder, sphere or box");
+    if (!mesh->mesh().has_uvs())
+      return refuse(fmt::format("is mapped by texture coordinates, and the mesh of \"{}\" has none", instance.name),
+                    "mapping by plane, cylinder, sphere or box, or a mesh with texture coordinates");
+    const ImplicitSurface* implicit = implicit_of(instance.surface);
+    if (implicit != nullptr && !implicit->grid().has_faces())
+      return refuse(
+          fmt::format("is mapped by texture coordinates, and the grid of \"{}\" knows no faces", instance.name),
+          "mapping by plane, cylinder, sphere or box");
+  }
+  return success();
+}
+
+}  // namespace asperity

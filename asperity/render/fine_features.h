@@ -1,0 +1,98 @@
+#pragma once
+// What is felt of a surface beside its geometry: texture, and friction that depends on place and direction
+// (heterogeneous-features-2008). F = F_constraint + F_friction + F_texture (eq. 1).
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "asperity/core/formulation.h"
+#include "asperity/core/result.h"
+#include "asperity/core/units.h"
+#include "asperity/field/height_map.h"
+#include "asperity/field/surface_features.h"
+#include "asperity/surface/feature_mapping.h"
+
+namespace asperity {
+
+/// Coefficients of friction over a surface: a map of factors.
+struct FrictionMap {
+  std::shared_ptr<const HeightMap> factors;  ///< of both coefficients, not negative
+  Vec2 tile = Vec2::Ones();                  ///< m of feature coordinate that one repeat covers
+};
+
+/// Friction that depends on the direction.
+struct FrictionLay {
+  double still_ratio = 1.0;    ///< static coefficient along the lay over that across it, 0 to 1
+  double sliding_ratio = 1.0;  ///< dynamic one, likewise
+  /// literal: eq. 15, interpolated by the velocity's angle to the gradient; consistent: elliptic.
+  Formulation formulation = Formulation::consistent;
+  /// Direction across the lay where no feature says it (rad from u towards v).
+  double direction = 0.0;
+};
+
+/// Where the lateral force comes from.
+enum class TextureSource : std::uint8_t {
+  features,  ///< procedural features and maps, by the mapping
+  coat,      ///< the coat of a mesh that is felt as its bare base: its heights, and its normal map in the literal form
+};
+
+/// Settings of FineFeatures.
+struct FineSettings {
+  FeatureMapping mapping;
+  TextureSource source = TextureSource::features;
+  std::vector<SurfaceFeature> texture;  ///< felt as texture force
+  /// Too fine for a texture: they give friction its lay, and each adds its mean slope to the coefficients across.
+  std::vector<SurfaceFeature> micro;
+  /// Of the texture force.
+  ///   literal     -grad h N with N the constraint's force (eq. 12), which feeds energy (erratum k), and the gradient
+  ///               in space (eq. 8) rather than along the surface
+  ///   consistent  the slope of one potential: spring force k p with p the penetration to the relief, whose crests lie
+  ///               on the surface
+  Formulation formulation = Formulation::consistent;
+  FrictionLay lay;
+  FrictionMap friction_map;
+  double resolution = 0.0;  ///< of the device's position (m), 0: ideal
+};
+
+/// Immutable and shared by the scenes that follow one another. [any]
+class FineFeatures {
+ public:
+  static constexpr std::size_t most_features = 16;
+  /// Errors: bad_value, mismatch, naming the member. [build]
+  static Result<FineFeatures> build(FineSettings settings);
+
+  [[nodiscard]] const FineSettings& settings() const noexcept { return settings_; }
+  /// Whether any texture force is felt. [servo]
+  [[nodiscard]] bool has_texture() const noexcept {
+    return settings_.source == TextureSource::coat || !settings_.texture.empty();
+  }
+  /// Whether friction depends on place or direction. [servo]
+  [[nodiscard]] bool shapes_friction() const noexcept { return shapes_friction_; }
+  /// Upper bound of the texture's height (m): what its crests are lowered by in the consistent form. [servo]
+  [[nodiscard]] double highest() const noexcept { return highest_; }
+  /// What the micro features add to the coefficients across the lay and along it: their mean slopes, for a load is
+  /// carried up each of them and let fall behind it. [servo]
+  [[nodiscard]] double interlock_across() const noexcept { return interlock_across_; }
+  [[nodiscard]] double interlock_along() const noexcept { return interlock_along_; }
+  /// Direction across the lay in the plane of the features, unit: that of the roughest micro feature, or of the first
+  /// texture that has one, or the lay's own. Zero where that feature has none. [servo]
+  [[nodiscard]] Vec2 across(const Vec2& uv) const noexcept;
+
+ private:
+  FineFeatures() = default;
+
+  FineSettings settings_;
+  bool shapes_friction_ = false;
+  double highest_ = 0.0;
+  double interlock_across_ = 0.0;
+  double interlock_along_ = 0.0;
+  std::size_t lay_feature_ = 0;  ///< of the micro features
+};
+
+/// How much of a texture of some wavelength is felt, 0 to 1. Below two samples or two steps of the device a wavelength
+/// would be felt as another one (errata l); it fades in up to four.
+///   `wavelength` on the surface (m), `speed` along it (m/s), `resolution` (m). [servo]
+double texture_share(double wavelength, double speed, Seconds dt, double resolution) noexcept;
+
+}  // namespace asperity
