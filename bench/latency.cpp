@@ -37,7 +37,7 @@ Status measure_all(const Options& options, Report& report) {
   std::vector<int> reliefs = {0, 3, 5, 6, 8};
   std::vector<std::uint32_t> volumes = {32, 64, 128, 256, 512};
   std::vector<int> potentials = {3, 4, 5, 6, 8};
-  std::vector<int> fine = {5};
+  std::vector<int> fine = {3};
   int map_size = 1024;
   if (options.quick) {
     effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};

@@ -15,13 +15,6 @@ struct Ratio {
   double margin = 0.0;  ///< above this, --check fails: far above the bar, as timings on shared machines scatter
 };
 
-/// One median of a run less another: what a part costs on top.
-struct Extra {
-  std::string what;
-  double nanoseconds = 0.0;
-  double bar = 0.0;  ///< what the project owes
-};
-
 /// Everything that one run found.
 struct Report {
   std::string machine;
@@ -31,8 +24,6 @@ struct Report {
   std::vector<Group> groups;
 
   [[nodiscard]] std::vector<Ratio> ratios() const;
-  /// What friction and texture cost on top of the contact.
-  [[nodiscard]] std::vector<Extra> extras() const;
   /// What does not hold, one sentence each: a row that did not answer, distances that disagree, a ratio over its
   /// margin.
   [[nodiscard]] std::vector<std::string> failures() const;

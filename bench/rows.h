@@ -27,6 +27,12 @@ inline constexpr const char* bare_contact = "contact alone, no friction";
 
 inline constexpr const char* contact_point_friction = "virtual contact point, friction, smooth";
 
+/// What a part of the tick costs on top of the rest, the median of differences taken in turn.
+struct Extra {
+  std::string what;
+  double nanoseconds = 0.0;
+};
+
 /// What was measured on one mesh.
 struct Group {
   std::string kind;  ///< "mesh", "relief", "volume", "potential" or "fine"
@@ -39,6 +45,7 @@ struct Group {
   std::size_t coat_bytes = 0;         ///< heights, shell directions and bands; 0 without a coat
   double largest_disagreement = 0.0;  ///< m, between our distance and Embree's over the whole slide
   std::vector<RowResult> rows;
+  std::vector<Extra> on_top;  ///< of "fine"
 
   /// "1280 triangles", "128^3 samples".
   [[nodiscard]] std::string size() const;
@@ -63,7 +70,7 @@ Result<Group> measure_volume(std::uint32_t count, const Effort& effort, double c
 Result<Group> measure_potential(int subdivisions, const Effort& effort, double clock_cost);
 
 /// The same mesh felt by its proxy alone, and with friction and texture as forces of their own on top: what they cost
-/// is the difference of the medians. [build]
+/// is measured against the bare contact in turn, a few ticks each, on the same slide. [build]
 Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <set>
 
 #include "apps/asperity/run.h"
 #include "asperity/io/atomic_file.h"
@@ -76,6 +77,15 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& names) {
     if (found.empty()) return Error{ErrorCode::file_missing, "has no CSV files in it", name, {}, "traces (.csv)"};
     std::sort(found.begin(), found.end());
     files.insert(files.end(), found.begin(), found.end());
+  }
+  // A trace that counts twice is fitted and predicted at once.
+  std::set<fs::path> seen;
+  for (const fs::path& file : files) {
+    std::error_code problem;
+    const fs::path real = fs::weakly_canonical(file, problem);
+    if (!seen.insert(problem ? file : real).second)
+      return Error{
+          ErrorCode::bad_value, "is named twice", file.string(), {}, "each trace once, by itself or its folder"};
   }
   return files;
 }

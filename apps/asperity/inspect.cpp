@@ -5,16 +5,19 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 
+#include "apps/asperity/feature_facts.h"
 #include "apps/asperity/feel.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
 #include "asperity/field/brick_store.h"
 #include "asperity/field/image.h"
-#include "asperity/field/roughness.h"
 #include "asperity/io/image_io.h"
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/sparse_io.h"
@@ -29,7 +32,7 @@ namespace fs = std::filesystem;
 struct InspectOptions {
   std::string file;
   SceneArgument scene;
-  double friction = 0.2;  ///< of the smooth material of a map
+  double friction = 0.2;  ///< of the smooth material of a map or of a scene's features
 };
 
 /// What inspecting found, in the order it is shown.
@@ -38,6 +41,7 @@ struct Findings {
   std::vector<ReportFact> facts;
   std::vector<std::string> problems;  ///< what is wrong with it
   std::vector<std::string> felt;      ///< what can be felt of it
+  Json features = Json::array();      ///< of a scene: its fine features in numbers
   void fact(std::string name, std::string value) { facts.push_back({std::move(name), std::move(value)}); }
 };
 
@@ -65,7 +69,7 @@ void mesh_facts(const TriangleMesh& mesh, Findings& found) {
 
 Result<Findings> inspect_trace(const std::string& file) {
   ASPERITY_TRY(const Trace trace, read_trace(file));
-  Findings found{"trace", {}, {}, {}};
+  Findings found{"trace", {}, {}, {}, Json::array()};
   found.fact("ticks", fmt::format("{} at {:g} Hz", trace.records.size(), trace.metadata.rate));
   found.fact("written by", trace.metadata.program);
   found.fact("command", trace.metadata.command);
@@ -82,8 +86,33 @@ Result<Findings> inspect_trace(const std::string& file) {
   return found;
 }
 
-Findings scene_findings(const Experiment& experiment) {
-  Findings found{"scene", {}, {}, {}};
+Json roughness_json(const Roughness& roughness) {
+  return {{"r_a_m", roughness.average}, {"r_q_m", roughness.rms}, {"mean_slope", roughness.mean_slope}};
+}
+
+Json feature_json(const FeatureFact& fact) {
+  Json json{{"surface", fact.surface},
+            {"type", feature_name(fact.feature.spec().kind)},
+            {"felt_as", scale_name(fact.felt_as)},
+            {"wavelength_m", fact.feature.wavelength()},
+            {"across", roughness_json(fact.across)},
+            {"along", roughness_json(fact.along)},
+            {"friction_proposed", {{"across", fact.friction_across}, {"along", fact.friction_along}}}};
+  if (fact.felt) {
+    const FeltWaves& felt = *fact.felt;
+    json["under_the_stroke"] = {{"shortest_wave_m", felt.waves.shortest},
+                                {"longest_wave_m", felt.waves.longest},
+                                {"roughest_wave_m", felt.roughest_wave},
+                                {"felt_roughness_of_shortest", felt.shortest},
+                                {"felt_roughness_of_longest", felt.longest},
+                                {"felt_roughness_of_roughest", felt.roughest},
+                                {"tip_radius_m", felt_tip_radius}};
+  }
+  return json;
+}
+
+Findings scene_findings(const Experiment& experiment, double smooth) {
+  Findings found{"scene", {}, {}, {}, Json::array()};
   found.fact("name", experiment.name);
   for (const ReportFact& fact : setup_facts(experiment)) found.facts.push_back(fact);
   found.fact("duration", fmt::format("{:.3g} s, {} ticks", experiment.path.duration().count(),
@@ -94,12 +123,15 @@ Findings scene_findings(const Experiment& experiment) {
     for (std::string& line : feel_of(experiment, instance))
       found.felt.push_back(fmt::format("{}: {}", instance.name, line));
   }
+  const std::vector<FeatureFact> features = feature_facts(experiment, smooth);
+  for (const FeatureFact& fact : features) found.features.push_back(feature_json(fact));
+  for (std::string& line : feature_lines(features, smooth)) found.felt.push_back(std::move(line));
   return found;
 }
 
 Result<Findings> inspect_scene(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
-  return scene_findings(experiment);
+  return scene_findings(experiment, options.friction);
 }
 
 /// What the file is as a scene of its own.
@@ -113,7 +145,7 @@ void add_scene_facts(const Findings& scene, Findings& found) {
 /// A mesh alone: the file as it is, then what can be felt of it with the defaults.
 Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(MeshSource source, read_mesh(options.file));
-  Findings found{"mesh", {}, {}, {}};
+  Findings found{"mesh", {}, {}, {}, Json::array()};
   Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source));
   if (!mesh) return std::move(mesh).error().in_file(options.file);
   const Vec3 extent = mesh->bounds().extent();
@@ -128,32 +160,20 @@ Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& pro
   return found;
 }
 
-std::string roughness_text(const Roughness& roughness) {
-  // What rounding leaves of a straight profile is no roughness.
-  constexpr double rounding = 1e-15;
-  const auto length = [](double metres) { return format_length(metres < rounding ? 0.0 : metres); };
-  return fmt::format("R_a {}, R_q {}, mean slope {:.3g}", length(roughness.average), length(roughness.rms),
-                     roughness.mean_slope);
-}
-
-/// Roughness of the relief as it is laid on, and the friction it would make if it were felt as nothing else.
-void topography_facts(const Experiment& laid, double smooth, Findings& found) {
-  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&laid.scene.instances().front().surface);
-  if (relief == nullptr) return;
-  const Mesostructure& maps = (*relief)->coat().maps();
-  const SurfaceRoughness roughness = surface_roughness(maps.heights(), maps.tile());
+/// Roughness of a relief one repeat of which has the size `tile` (m), and the friction it would make if it were felt as
+/// nothing else. `texel`: its finest detail (m).
+void topography_facts(const HeightMap& heights, const Vec2& tile, double texel, const DeviceProfile& device,
+                      double smooth, Findings& found) {
+  const SurfaceRoughness roughness = surface_roughness(heights, tile);
   found.fact("roughness along the width", roughness_text(roughness.along_s));
   found.fact("roughness along the height", roughness_text(roughness.along_t));
   const FrictionProposal proposal = propose_friction(roughness, smooth);
   const double along_s = proposal.rough_along_s ? proposal.across : proposal.along;
   const double along_t = proposal.rough_along_s ? proposal.along : proposal.across;
   found.fact("friction proposed", fmt::format("{:.3g} along the width, {:.3g} along the height", along_s, along_t));
-  std::string reason = fmt::format(
-      "friction: to {:g} of the smooth material (--friction) comes the mean slope of each direction, because carrying "
-      "a load up a slope m takes m times the load and none of it comes back where the slider drops off; at most 2",
-      smooth);
-  const double shortest = 4.0 * (*relief)->coat().texel_size();
-  const FeatureScale scale = scale_of(shortest, feature_scales(laid.device.position_resolution));
+  std::string reason = proposal_reason(smooth);
+  const double shortest = 4.0 * texel;
+  const FeatureScale scale = scale_of(shortest, feature_scales(device.position_resolution));
   if (scale != FeatureScale::friction) {
     reason += fmt::format("; waves of {} and more are felt as {} themselves, so it holds where the relief is left out",
                           format_length(shortest), scale_name(scale));
@@ -161,10 +181,75 @@ void topography_facts(const Experiment& laid, double smooth, Findings& found) {
   found.felt.push_back(std::move(reason));
 }
 
+void laid_facts(const Experiment& laid, double smooth, Findings& found) {
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&laid.scene.instances().front().surface);
+  if (relief == nullptr) return;
+  const Coat& coat = (*relief)->coat();
+  topography_facts(coat.maps().heights(), coat.maps().tile(), coat.texel_size(), laid.device, smooth, found);
+}
+
+/// A measured map at its own size.
+struct OwnSize {
+  HeightMap heights;
+  Vec2 tile;          ///< m
+  double low = 0.0;   ///< m, of black
+  double high = 0.0;  ///< m, of white
+};
+/// By what the JSON file beside it says, which reading a scene has checked; nothing where that says no size.
+std::optional<OwnSize> own_size(const std::string& file, const Image& image, Channel channel) {
+  std::ifstream stream(fs::path(file).replace_extension(".json"), std::ios::binary);
+  const Json sidecar = Json::parse(stream, nullptr, false);
+  const auto number = [](const Json& json) { return json.is_number() ? json.get<double>() : std::nan(""); };
+  const auto member = [&](const char* key) { return sidecar.contains(key) ? number(sidecar[key]) : std::nan(""); };
+  if (!sidecar.is_object() || !sidecar.contains("pixel_size_m") || !sidecar["pixel_size_m"].is_array()) return {};
+  const Json& pixel = sidecar["pixel_size_m"];
+  const double low = member("height_min_m");
+  const double high = member("height_max_m");
+  if (pixel.size() != 2 || !std::isfinite(high - low) || high < low) return {};
+  const Vec2 tile(number(pixel[0]) * image.width, number(pixel[1]) * image.height);
+  Result<HeightMap> heights =
+      HeightMap::build(image, channel, {high - low, low, false, Wrap::repeat, Reconstruction::quadratic_bspline});
+  if (!heights || !tile.allFinite() || !(tile.minCoeff() > 0.0)) return {};
+  return OwnSize{std::move(*heights), tile, low, high};
+}
+
+/// A map as large as it says it is: what cannot be laid on the trial sheet. `refusal`: why it cannot.
+Status own_size_facts(const InspectOptions& options, const Image& image, Channel channel, Error refusal,
+                      Findings& found) {
+  // Heights and size of the command line are asked for: what they do not fit is an error.
+  if (!options.scene.height.empty() || !options.scene.tile.empty()) return refusal;
+  const std::optional<OwnSize> own = own_size(options.file, image, channel);
+  SceneArgument bare = options.scene;
+  bare.scene = "M_a-H_0";
+  const Result<Experiment> sheet = load_scene(bare, {});
+  if (!own || !sheet) return refusal;
+  const HeightMap& heights = own->heights;
+  found.fact("size as it is",
+             fmt::format("{} x {}, {} to {} high", format_length(own->tile.x()), format_length(own->tile.y()),
+                         format_length(own->low), format_length(own->high)));
+  topography_facts(heights, own->tile, own->tile.x() / heights.width(), sheet->device, options.friction, found);
+  const Box bounds = surface_bounds(sheet->scene.instances().front().surface);
+  const double highest = std::max(std::abs(heights.lowest()), std::abs(heights.highest()));
+  // Rounded down, so that what is printed is accepted.
+  const double most = 0.5 * bounds.diagonal() / highest;
+  const double digits = std::pow(10.0, std::floor(std::log10(most)) - 1.0);
+  found.problems.push_back(fmt::format(
+      "it is too large for the trial sheet, so what can be felt of it there is not told: it {}; accepted: {}. A coat "
+      "with \"magnify\": {:.2g} or less, which scales heights and size alike, can be laid on it",
+      refusal.what, refusal.accepted, std::floor(most / digits) * digits));
+  return success();
+}
+
+/// Whether a map was refused for its heights.
+bool too_high(const Error& error) {
+  return error.code == ErrorCode::bad_value &&
+         (error.place.ends_with("coat.height_map") || error.place.ends_with("coat.height"));
+}
+
 /// A map alone, laid on a sheet so that what can be felt of it has a size.
 Result<Findings> inspect_image(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(const Image image, read_image(options.file));
-  Findings found{"map", {}, {}, {}};
+  Findings found{"map", {}, {}, {}, Json::array()};
   found.fact("pixels", fmt::format("{} x {}", image.width, image.height));
   found.fact("channels", fmt::format("{} of {} bits", image.channels, image.bits));
   Result<ChannelChoice> choice = choose_channel(image, Channel::automatic);
@@ -181,8 +266,14 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   laid.scene.scene = "M_a-H_0";
   laid.scene.relief = options.file;
   laid.scene.mapping = "triplanar";
-  ASPERITY_TRY(const Experiment experiment, load_scene(laid.scene, progress));
-  const Findings scene = scene_findings(experiment);
+  Result<Experiment> loaded = load_scene(laid.scene, progress);
+  if (!loaded) {
+    if (!too_high(loaded.error())) return std::move(loaded).error();
+    ASPERITY_CHECK(own_size_facts(options, image, choice->channel, std::move(loaded).error(), found));
+    return found;
+  }
+  const Experiment& experiment = *loaded;
+  const Findings scene = scene_findings(experiment, options.friction);
   for (const std::string& note : scene.problems) {
     if (note.starts_with("coat:")) found.problems.push_back(note);
   }
@@ -190,7 +281,7 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
     if (fact.name.starts_with("surface")) found.fact("laid on a sheet", fact.value);
   }
   found.felt = scene.felt;
-  topography_facts(experiment, options.friction, found);
+  laid_facts(experiment, options.friction, found);
   return found;
 }
 
@@ -221,7 +312,7 @@ void array_facts(const VolumeSource& source, Findings& found) {
 /// A volume whose samples are read, then what can be felt of it with the defaults.
 Result<Findings> inspect_volume(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(const VolumeSource source, read_volume(options.file, {}, progress));
-  Findings found{"volume", {}, {}, {}};
+  Findings found{"volume", {}, {}, {}, Json::array()};
   axis_facts(source.axes(), "of the file's unit", found);
   array_facts(source, found);
   found.fact("looked at", fmt::format("\"{}\"{}", source.array, source.cell_data ? ", in the cells' middles" : ""));
@@ -246,7 +337,7 @@ Result<Findings> inspect_volume(const InspectOptions& options, const Progress& p
 /// A .vdb file as it is, then what can be felt of it with the defaults.
 Result<Findings> inspect_sparse(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(SparseFile file, read_sparse(options.file, {}, progress));
-  Findings found{"level set", {}, {}, {}};
+  Findings found{"level set", {}, {}, {}, Json::array()};
   for (const SparseGridEntry& entry : file.entries) {
     found.fact(fmt::format("grid \"{}\"", entry.name),
                fmt::format("{}, {}, {} points, voxel {:.6g}", entry.type, entry.grid_class, entry.points, entry.voxel));
@@ -268,7 +359,7 @@ Result<Findings> inspect_bricks(const std::string& file) {
   BrickSettings settings;
   settings.stream = false;
   ASPERITY_TRY(const std::unique_ptr<BrickStore> store, BrickStore::open(file, settings));
-  Findings found{"bricked volume", {}, {}, {}};
+  Findings found{"bricked volume", {}, {}, {}, Json::array()};
   axis_facts(store->axes(0), "m", found);
   found.fact("array", fmt::format("\"{}\", {}, {:.6g} to {:.6g}", store->name(), to_string(store->type()),
                                   store->lowest(), store->highest()));
@@ -315,11 +406,13 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
   if (console.json) {
     Json facts = Json::object();
     for (const ReportFact& fact : found.facts) facts[fact.name] = fact.value;
-    console.print(Json{{"file", options.file},
-                       {"kind", found.kind},
-                       {"facts", facts},
-                       {"to_know", found.problems},
-                       {"felt", found.felt}});
+    Json document{{"file", options.file},
+                  {"kind", found.kind},
+                  {"facts", facts},
+                  {"to_know", found.problems},
+                  {"felt", found.felt}};
+    if (!found.features.empty()) document["features"] = found.features;
+    console.print(document);
   } else {
     print_findings(options.file, found);
   }
@@ -343,7 +436,7 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
   command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
   command
       ->add_option("--friction", options->friction,
-                   "Of a map: coefficient of friction of its material where it is smooth")
+                   "Of a map, or of a scene's features: coefficient of friction of the material where it is smooth")
       ->check(CLI::Range(0.0, 2.0))
       ->capture_default_str();
   command->add_option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");

@@ -16,6 +16,18 @@ namespace {
 constexpr const char* kinds[] = {"mesh", "relief", "implicit"};
 constexpr const char* literal_suffix = "-literal";
 
+/// Whether a friction law was printed with defects.
+bool has_literal(const std::string& friction) {
+  return friction == "karnopp" || friction == "coulomb" || friction == "lugre";
+}
+
+/// "no-friction" and the friction laws: one a name.
+bool says_friction(const std::string& word) {
+  const std::string stem = word.substr(0, word.rfind(literal_suffix));
+  const std::vector<std::string>& names = friction_names();
+  return word == "no-friction" || std::find(names.begin(), names.end(), stem) != names.end();
+}
+
 Error unknown(const std::string& word, const std::vector<std::string>& accepted) {
   std::string list;
   for (const std::string& known : accepted) list += (list.empty() ? "" : ", ") + known;
@@ -124,7 +136,7 @@ const std::vector<std::string>& fine_words() {
     std::vector<std::string> all{"no-friction", "texture", "texture-literal", "no-texture", "lay", "lay-literal"};
     for (const std::string& name : friction_names()) {
       all.push_back(name);
-      all.push_back(name + literal_suffix);
+      if (has_literal(name)) all.push_back(name + literal_suffix);
     }
     return all;
   }();
@@ -148,6 +160,15 @@ Result<Rival> parse_rival(const std::string& name) {
     const std::string word = rest.substr(plus + 1, next == std::string::npos ? next : next - plus - 1);
     const std::vector<std::string>& words = fine_words();
     if (std::find(words.begin(), words.end(), word) == words.end()) return unknown(word, words);
+    for (const std::string& other : rival.fine) {
+      if (other != word && !(says_friction(word) && says_friction(other)) && split(other).first != split(word).first)
+        continue;
+      return Error{ErrorCode::bad_value,
+                   fmt::format("\"{}\" says both +{} and +{}", name, other, word),
+                   {},
+                   "--laws",
+                   "one of them"};
+    }
     rival.fine.push_back(word);
     plus = next;
   }

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "asperity/io/scene_heights.h"
+#include "asperity/io/texture_waves.h"
 
 namespace asperity {
 namespace {
@@ -448,47 +449,11 @@ class TextureReader {
   TexturePart part_;
 };
 
-/// Shortest and longest wavelength along a stroke (m), by how the mapping stretches features there.
-struct Stretch {
-  double shortest = infinity;
-  double longest = 0.0;
-};
-
-Stretch stretch_along(const Instance& instance, const StrokePath& path) {
-  const FeatureMapping& mapping = instance.fine->settings().mapping;
-  const ParametricSurface* surface = parametric_of(instance.surface);
-  const bool by_parameters = mapping.settings().surface == IntermediateSurface::uv;
-  Stretch stretch;
-  if ((by_parameters && surface == nullptr) || path.recorded()) return {1.0, 1.0};
-  Hint hint;
-  MappedPlaces places;
-  const std::size_t step = std::max<std::size_t>(1, path.points().size() / 256);
-  for (std::size_t i = 0; i < path.points().size(); i += step) {
-    const Vec3 point = instance.world_from_object.apply_inverse(path.points()[i]);
-    const Vec3 normal = instance.world_from_object.rotate_inverse(path.normals()[i]);
-    places.clear();
-    if (by_parameters) {
-      if (!surface->closest(point, infinity, hint).found()) continue;
-      MappedPlace place;
-      ParametricSurface::parameter_gradients(surface->jet(hint.parametric.uv), place.du, place.dv);
-      place.du *= mapping.settings().tile.x();
-      place.dv *= mapping.settings().tile.y();
-      places.push_back(place);
-    } else {
-      mapping.map(point, places);
-    }
-    for (const MappedPlace& place : places) {
-      const double steepest =
-          std::max(surface_gradient(place.du, normal).norm(), surface_gradient(place.dv, normal).norm());
-      if (!(steepest > 1e-6)) continue;
-      stretch.shortest = std::min(stretch.shortest, 1.0 / steepest);
-      stretch.longest = std::max(stretch.longest, 1.0 / steepest);
-    }
-  }
-  return stretch.longest > 0.0 ? stretch : Stretch{1.0, 1.0};
-}
-
 }  // namespace
+
+const char* mapping_name(IntermediateSurface surface) {
+  return mapping_names()[static_cast<std::size_t>(surface)].c_str();
+}
 
 Result<TexturePart> read_texture(ObjectReader& surface, const TextureHost& host, const Law& law,
                                  SceneContext& context) {
@@ -541,19 +506,27 @@ void note_rendering(const Instance& instance, const StrokePath& path, double spe
                     SceneContext& context) {
   if (instance.fine == nullptr || instance.fine->settings().texture.empty()) return;
   const FineSettings& fine = instance.fine->settings();
-  const Stretch stretch = stretch_along(instance, path);
   for (const SurfaceFeature& feature : fine.texture) {
-    const double shortest = feature.wavelength() * stretch.shortest;
-    const double longest = feature.wavelength() * stretch.longest;
-    const double share = texture_share(shortest, speed, Seconds(1.0 / rate), fine.resolution);
-    const std::string size = longest < 1.01 * shortest
-                                 ? format_length(shortest)
-                                 : fmt::format("{} to {}", format_length(shortest), format_length(longest));
-    const std::string levels = fine.resolution > 0.0 ? fmt::format("{:.4g} levels of {}", shortest / fine.resolution,
-                                                                   format_length(fine.resolution))
-                                                     : std::string("as many levels as wanted");
+    const WaveRange waves = waves_along(instance, feature, path);
+    if (!waves.changes) {
+      context.note(fmt::format(
+          "surface \"{}\": {} of {} does not change along the surface under the stroke, as the mapping \"{}\" lays it "
+          "there: no texture is felt of it (another axis, direction or mapping lays it along the surface)",
+          instance.name, feature_name(feature.spec().kind), format_length(feature.wavelength()),
+          mapping_name(fine.mapping.settings().surface)));
+      continue;
+    }
+    const double share = texture_share(waves.shortest, speed, Seconds(1.0 / rate), fine.resolution);
+    const std::string size = waves.longest < 1.01 * waves.shortest
+                                 ? format_length(waves.shortest)
+                                 : fmt::format("{} to {}", format_length(waves.shortest), format_length(waves.longest));
+    const std::string levels =
+        fine.resolution > 0.0
+            ? fmt::format("{:.4g} levels of {}", waves.shortest / fine.resolution, format_length(fine.resolution))
+            : std::string("as many levels as wanted");
     context.note(fmt::format("surface \"{}\": {} of {} under the stroke: {} and {:.4g} samples of the shortest wave{}",
-                             instance.name, feature_name(feature.spec().kind), size, levels, shortest * rate / speed,
+                             instance.name, feature_name(feature.spec().kind), size, levels,
+                             waves.shortest * rate / speed,
                              share < 1.0 ? fmt::format(", where it is faded to {:.0f} %", 100.0 * share) : ""));
   }
 }

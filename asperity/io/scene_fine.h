@@ -19,6 +19,12 @@ struct FinePart {
 };
 /// Reads `friction`, `lay` and `friction_map` of a material. [build]
 Result<FinePart> read_friction(ObjectReader& material, SceneContext& context, Material& into);
+/// Says where a material's friction can never resist, and where its law does not read a coefficient that it has.
+/// [build]
+void note_friction(const Instance& instance, const FinePart& part, SceneContext& context);
+
+/// "plane", "cylinder", "sphere", "box", "uv", as scenes call them. [any]
+const char* mapping_name(IntermediateSurface surface);
 
 /// What features are laid on.
 struct TextureHost {

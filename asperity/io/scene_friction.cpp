@@ -82,7 +82,7 @@ void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
   lay.still_ratio = reader.quantity("still_ratio", Dimension::ratio, 1.0, Range{0.0, 1.0});
   lay.sliding_ratio = reader.quantity("sliding_ratio", Dimension::ratio, lay.still_ratio, Range{0.0, 1.0});
   lay.formulation = static_cast<Formulation>(reader.choice("formulation", formulation_names(), 1));
-  lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
+  if (reader.has("direction")) lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
   material.take("lay", std::move(reader));
 }
 
@@ -120,6 +120,43 @@ Result<FinePart> read_friction(ObjectReader& material, SceneContext& context, Ma
   }
   ASPERITY_CHECK(material.status());
   return part;
+}
+
+void note_friction(const Instance& instance, const FinePart& part, SceneContext& context) {
+  const Material& material = instance.material;
+  const FrictionLaw& law = material.friction;
+  const bool asked_for = material.friction_named || part.lay_given || part.friction_map.factors != nullptr;
+  if (!asked_for) return;
+  const bool interlocks = instance.fine != nullptr && !instance.fine->settings().micro.empty();
+  const bool viscous = law.kind == FrictionKind::viscous;
+  const bool slides_alone = law.kind == FrictionKind::coulomb || law.kind == FrictionKind::dahl ||
+                            law.kind == FrictionKind::hayward_armstrong;
+  const bool by_coefficient = material.dynamic_friction > 0.0 || (material.static_friction > 0.0 && !slides_alone);
+  const bool resists = law.viscosity > 0.0 || (!viscous && (by_coefficient || law.break_away > 0.0 || interlocks));
+  if (!resists) {
+    const std::string what = material.friction_named ? fmt::format("the friction law \"{}\"", friction_name(law.kind))
+                                                     : std::string(part.lay_given ? "the lay" : "the friction map");
+    const char* missing = viscous        ? "viscosity"
+                          : slides_alone ? "dynamic_friction"
+                                         : "static_friction and dynamic_friction";
+    context.note(fmt::format("surface \"{}\": {} resists nothing, because {} {} 0 (\"{}\" of the material chooses)",
+                             instance.name, what, missing, viscous || slides_alone ? "is" : "are",
+                             viscous        ? "friction.viscosity"
+                             : slides_alone ? "dynamic_friction"
+                                            : "static_friction"));
+  }
+  if (!material.friction_named) return;
+  if (viscous && material.static_friction > 0.0) {
+    context.note(
+        fmt::format("surface \"{}\": the friction law \"viscous\" reads neither static_friction nor dynamic_friction, "
+                    "only its viscosity",
+                    instance.name));
+  } else if (slides_alone && material.static_friction > material.dynamic_friction) {
+    context.note(
+        fmt::format("surface \"{}\": the friction law \"{}\" does not read the static_friction of {:g}: it slides at "
+                    "the dynamic_friction of {:g}",
+                    instance.name, friction_name(law.kind), material.static_friction, material.dynamic_friction));
+  }
 }
 
 }  // namespace asperity

@@ -75,7 +75,8 @@ Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& cont
   if (!texture.geometry.empty()) {
     settings.features = texture.geometry;
     settings.tile = texture.fine.mapping.settings().tile;
-    ASPERITY_TRY(shape, build_shape(settings, surface.place_of("texture.features")));
+    // The error says "features" itself.
+    ASPERITY_TRY(shape, build_shape(settings, surface.place_of("texture")));
   }
   instance.surface = std::make_shared<const ParametricSurface>(std::move(shape));
   return surface.status();

@@ -101,7 +101,18 @@ Status read_triangles(ObjectReader& reader, const Law& law, SceneContext& contex
   if (baked != nullptr) {
     const std::string place = reader.place_of("texture.features");
     Result<Coat> coat = Coat::build(base.mesh(), std::move(baked), CoatSettings{});
-    if (!coat) return std::move(coat).error().at(place);
+    if (!coat) {
+      if (coat.error().place != "mapping") return std::move(coat).error().at(place);
+      // The coat lies by coordinates that were made from the mapping, which is what the scene says.
+      return Error{
+          ErrorCode::mismatch,
+          fmt::format("is \"{}\", seen from which the surface spans no area in the plane of the features",
+                      mapping_name(texture.fine.mapping.settings().surface)),
+          {},
+          reader.place_of("texture.mapping.surface"),
+          "another mapping (\"plane\" for a sheet) or another \"axis\" or \"origin\" of it; \"as\": \"texture\" "
+          "needs no area"};
+    }
     ASPERITY_TRY(instance.surface,
                  build_relief(std::move(base), std::move(*coat), reader, context, instance.name, place));
     return success();
@@ -224,6 +235,7 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
     ASPERITY_TRY(texture, read_texture(reader, host, instance.law, context));
   }
   ASPERITY_CHECK(attach_fine(reader, std::move(texture), material.fine, context, instance));
+  note_friction(instance, material.fine, context);
   ASPERITY_CHECK(reader.status());
   return ScenePart<Instance>{std::move(instance), std::move(reader.canonical())};
 }

@@ -276,6 +276,24 @@ Vec3 force_of(const FrictionLaw& law, const TangentContact& c, FrictionState& st
   return Vec3::Zero();
 }
 
+/// A law or a stiffness that was changed while touching. The spring may not gain: a stiffer one goes on with its force,
+/// a softer one with its energy.
+void take_over(const FrictionLaw& law, double own, FrictionState& state) noexcept {
+  const double stiffness = !has_spring(law.kind) ? 0.0 : law.stiffness > 0.0 ? law.stiffness : own;
+  if (state.kind != law.kind) {
+    state.kind = law.kind;
+    state.sliding = state.fast = false;
+  }
+  if (stiffness == state.stiffness) return;
+  if (stiffness == 0.0) {
+    state.stretch.setZero();
+  } else if (state.stiffness > 0.0) {
+    const double ratio = state.stiffness / stiffness;
+    state.stretch *= ratio < 1.0 ? ratio : std::sqrt(ratio);
+  }
+  state.stiffness = stiffness;
+}
+
 }  // namespace
 
 Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, FrictionState& state) noexcept {
@@ -283,6 +301,7 @@ Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, Fric
   if (first) state = FrictionState{};
   state.held = true;
   state.stretch -= contact.normal.dot(state.stretch) * contact.normal;
+  take_over(law, contact.stiffness, state);
   TangentContact tangent = tangent_contact(law, contact, state.stretch);
   if (first && has_spring(law.kind)) {
     // Where the motion began is not known to have been on the surface.
@@ -299,9 +318,8 @@ Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, Fric
   return Vec3::Zero();
 }
 
-double friction_energy(const FrictionLaw& law, double stiffness, const FrictionState& state) noexcept {
-  if (!has_spring(law.kind)) return 0.0;
-  return 0.5 * (law.stiffness > 0.0 ? law.stiffness : stiffness) * state.stretch.squaredNorm();
+double friction_energy(const FrictionState& state) noexcept {
+  return 0.5 * state.stiffness * state.stretch.squaredNorm();
 }
 
 }  // namespace asperity

@@ -87,9 +87,11 @@ struct FrictionContact {
 /// What a contact remembers between ticks. `FrictionState{}` is one that has just been made.
 struct FrictionState {
   Vec3 stretch = Vec3::Zero();  ///< of the spring: from its anchor to the probe (m), in the tangent plane
-  bool sliding = false;         ///< the last tick slid
-  bool fast = false;            ///< karnopp: has been as fast as stick_speed since it broke away
-  bool held = false;            ///< the state is of a contact that goes on
+  double stiffness = 0.0;       ///< of the spring that holds it (N/m); 0: not stretched yet
+  FrictionKind kind = FrictionKind::implicit_coulomb;  ///< that the rest belongs to
+  bool sliding = false;                                ///< the last tick slid
+  bool fast = false;                                   ///< karnopp: has been as fast as stick_speed since it broke away
+  bool held = false;                                   ///< the state is of a contact that goes on
 };
 
 /// Friction force on the probe (N), in the tangent plane. The first tick of a contact stretches nothing.
@@ -97,8 +99,8 @@ struct FrictionState {
 /// Laws without a spring never push along the velocity. For the others, the sum of -f . motion (f the force answered
 /// with that motion) is not below the change of friction_energy, at any dt (formulation, amendment 7). [servo]
 Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, FrictionState& state) noexcept;
-/// Energy held in the tangential spring (J). `stiffness`: the contact's own (N/m). [servo]
-double friction_energy(const FrictionLaw& law, double stiffness, const FrictionState& state) noexcept;
+/// Energy held in the tangential spring (J). [servo]
+double friction_energy(const FrictionState& state) noexcept;
 
 /// The point of an ellipse's disc that is nearest to `pull`, in the tangent plane: `across` unit, the half-axis along
 /// it, and the half-axis at right angles to it in the plane of `normal`, none negative. With `across` zero a circle of

@@ -55,8 +55,8 @@ struct TextureSample {
 
 /// How much of a feature is felt at a place whose coordinates have these gradients along the surface, at a `velocity`
 /// along it.
-double felt_share(const SurfaceFeature& feature, const MappedPlace& place, const Vec3& du, const Vec3& dv,
-                  const Vec3& velocity, Seconds dt, double resolution) noexcept {
+double felt_share(const SurfaceFeature& feature, double steepness, const MappedPlace& place, const Vec3& du,
+                  const Vec3& dv, const Vec3& velocity, Seconds dt, double resolution) noexcept {
   constexpr double whole_from = 4.0;  // steps a wavelength, as texture_share has it
   const double wavelength = feature.wavelength();
   const Vec2 across = feature.across(place.uv);
@@ -72,13 +72,17 @@ double felt_share(const SurfaceFeature& feature, const MappedPlace& place, const
     passed = std::sqrt(density * velocity.squaredNorm());
   }
   const double finest = whole_from * resolution;
-  if (wavelength >= whole_from * passed * dt.count() && wavelength * wavelength >= finest * finest * density)
-    return 1.0;
+  const bool renderable =
+      wavelength >= whole_from * passed * dt.count() && wavelength * wavelength >= finest * finest * density;
+  constexpr double most_slope = FineFeatures::most_slope;
+  const bool crowded = steepness * steepness * density > most_slope * most_slope;
+  if (renderable && !crowded) return 1.0;
   const double root = std::sqrt(density);
-  return texture_share(wavelength / root, passed / root, dt, resolution);
+  const double share = texture_share(wavelength / root, passed / root, dt, resolution);
+  return crowded ? share * most_slope / (steepness * root) : share;
 }
 
-TextureSample sample_features(const FineSettings& fine, const MappedPlaces& places, const Vec3& normal,
+TextureSample sample_features(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal,
                               const FineMotion& motion, double resolution) noexcept {
   TextureSample out;
   const Vec3 along = surface_gradient(motion.velocity, normal);
@@ -87,8 +91,10 @@ TextureSample sample_features(const FineSettings& fine, const MappedPlaces& plac
     Vec2 gradient = Vec2::Zero();
     const Vec3 du = surface_gradient(place.du, normal);
     const Vec3 dv = surface_gradient(place.dv, normal);
-    for (const SurfaceFeature& feature : fine.texture) {
-      const double share = felt_share(feature, place, du, dv, along, motion.dt, resolution);
+    const std::vector<SurfaceFeature>& features = fine.settings().texture;
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      const SurfaceFeature& feature = features[i];
+      const double share = felt_share(feature, fine.steepness(i), place, du, dv, along, motion.dt, resolution);
       out.faded = out.faded || share < 1.0;
       if (share == 0.0) continue;
       const FeatureSample here = feature.sample(place.uv);
@@ -125,10 +131,16 @@ TextureSample sample_coat(const ReliefSurface& relief, Formulation formulation, 
   return out;
 }
 
+/// A sheet's coat rises on its front: seen from behind it is a hollow.
+bool from_behind(const ReliefSurface& relief, std::uint32_t element, const Vec3& normal) noexcept {
+  const TriangleMesh& mesh = relief.base().mesh();
+  return element < mesh.triangles().size() && normal.dot(mesh.face_normal(element)) < 0.0;
+}
+
 /// What a step of the probe makes of a step along the surface: below a convex surface the foot runs ahead.
-Vec3 at_probe(const Vec3& gradient, const Mat3& bend, double depth) noexcept {
-  if (bend.isZero()) return gradient;
-  const Mat3 shrink = Mat3::Identity() - depth * bend;
+Vec3 at_probe(const Vec3& gradient, const LawForce& law, double depth) noexcept {
+  if (!law.bends) return gradient;
+  const Mat3 shrink = Mat3::Identity() - depth * law.bend;
   constexpr double least = 0.05;  // nearer to the centre of the bend the foot means nothing
   return shrink.determinant() > least ? Vec3(shrink.inverse() * gradient) : gradient;
 }
@@ -140,49 +152,116 @@ void add_printed_texture(const TextureSample& texture, LawForce& law) noexcept {
   law.height = texture.height;
 }
 
-/// What the texture may still give (0 to 1): its force is the slope of one potential, but a foot that jumps, a relief
-/// below, or a share that changes with speed would let it give more than it took.
-double giving(const TextureState& state, const Vec3& texture, double stiffness, const Vec3& moved) noexcept {
+/// What the contact may still give (0 to 1) of a force: it is the slope of one potential, but a foot that jumps, a
+/// relief below, or a share that changes with speed would let it give more than it took.
+double giving(double book, const Vec3& force, double stiffness, const Vec3& moved) noexcept {
   constexpr double free_credit = 1e-6;  // J
-  if (state.book >= 0.0 || texture.dot(moved) <= 0.0) return 1.0;
-  // A spring held over a tick is off by this much by itself.
+  constexpr double changeover = 0.1;    // cosine between force and motion over which taking turns into giving
+  const double done = force.dot(moved);
+  if (book >= 0.0 || done <= 0.0) return 1.0;
+  // A force held over a tick is off by this much by itself.
   const double credit = free_credit + 0.5 * stiffness * moved.squaredNorm();
-  return std::clamp(2.0 + state.book / credit, 0.0, 1.0);
+  const double share = std::clamp(2.0 + book / credit, 0.0, 1.0);
+  const double along = std::min(1.0, done / (changeover * force.norm() * moved.norm()));
+  return 1.0 - along * (1.0 - share);
+}
+
+/// Books what the relief gave over the last tick beyond what its potential lost, by the trapezoid: what the field
+/// itself gives, not what holding a force over a tick adds. `force`, `potential`, `penetration` as TextureState has
+/// them.
+void keep_book(const Vec3& force, double potential, double penetration, const Vec3& moved,
+               TextureState& state) noexcept {
+  constexpr double most_credit = 1e-5;  // J
+  double before = state.penetration;
+  if (!state.held) {
+    if (!(penetration > 0.0) || moved.isZero(0.0)) return;
+    // Where the relief's own slope says that it came from. Out of contact it cannot have been in contact: if the slope
+    // says so, what it holds now was never put in.
+    before = penetration + force.dot(moved) * penetration / (2.0 * potential);
+    if (before <= 0.0) return;
+  }
+  // The part of the motion during which the relief was touched.
+  double touched = 1.0;
+  if (before <= 0.0) touched = penetration > 0.0 ? penetration / (penetration - before) : 0.0;
+  if (penetration <= 0.0) touched = before > 0.0 ? before / (before - penetration) : 0.0;
+  const double gave = 0.5 * touched * (state.force + force).dot(moved) + potential - state.potential;
+  state.book = std::min(most_credit, state.book - gave);
 }
 
 /// Slope of k p^2 / 2 with p the penetration to the relief, whose crests lie on the surface. False: the relief is not
 /// touched.
 bool add_relief_texture(const TextureSample& texture, double highest, double stiffness, const Vec3& moved,
                         TextureState& state, LawForce& law) noexcept {
-  constexpr double most_credit = 1e-5;  // J
   const double depth = law.push / stiffness;
   const double penetration = depth + std::min(0.0, texture.height - highest);
   law.height = texture.height - highest;
-  if (!(penetration > 0.0)) return false;
+  if (!(penetration > 0.0)) {
+    keep_book(Vec3::Zero(), 0.0, penetration, moved, state);
+    state.held = true;
+    state.force = Vec3::Zero();
+    state.potential = 0.0;
+    state.penetration = penetration;
+    return false;
+  }
   const double push = stiffness * penetration;
-  const Vec3 slope = at_probe(surface_gradient(texture.gradient, law.normal), law.bend, depth);
+  const Vec3 slope = at_probe(surface_gradient(texture.gradient, law.normal), law, depth);
   const Vec3 relief = push * (law.normal - slope);
   const double potential = 0.5 * push * penetration;
-  Vec3 added = relief - law.push * law.normal;
-  if (state.held) {
-    // Trapezoidal: what the field itself gives, not what holding a force over a tick adds.
-    const double gave = 0.5 * (state.force + relief).dot(moved) + potential - state.potential;
-    state.book = std::min(most_credit, state.book - gave);
-    const double share = giving(state, added, stiffness, moved);
-    state.book += 0.5 * (1.0 - share) * added.dot(moved);
-    added *= share;
-  }
+  keep_book(relief, potential, penetration, moved, state);
+  const double share = giving(state.book, relief, stiffness, moved);
+  if (share < 1.0) state.book += 0.5 * (1.0 - share) * relief.dot(moved);
   state.held = true;
-  state.force = law.push * law.normal + added;
+  state.force = share * relief;
   state.potential = potential;
-  law.texture = added;
-  law.force += added;
+  state.penetration = penetration;
+  law.texture = share * relief - law.push * law.normal;
+  law.force += law.texture;
   // Damping was measured against the constraint's whole push.
   const double along = law.force.dot(law.normal);
   if (along < 0.0) law.force -= along * law.normal;
-  law.push = push;
+  law.push = share * push;
   law.penetration = penetration;
   return true;
+}
+
+/// Coefficients of a place, and across which direction they are largest.
+void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal, TextureState& state,
+                    FrictionCoefficients& coefficients) noexcept {
+  const FineSettings& settings = fine.settings();
+  double factor = 1.0;
+  if (settings.friction_map.factors != nullptr) {
+    factor = 0.0;
+    for (const MappedPlace& place : places) {
+      const Vec2 st = place.uv.cwiseQuotient(settings.friction_map.tile);
+      factor += place.weight * std::max(0.0, settings.friction_map.factors->height_at(st));
+    }
+  }
+  const MappedPlace& place = places[0];
+  const Vec2 lay = fine.across(place.uv);
+  const LayMatrix added = fine.interlocks() ? fine.interlock(place.uv) : LayMatrix{};
+  const double still = factor * coefficients.still;
+  const double sliding = factor * coefficients.sliding;
+  const LayMatrix holds = LayMatrix::of(still, still * settings.lay.still_ratio, lay) + added;
+  const LayMatrix slides = LayMatrix::of(sliding, sliding * settings.lay.sliding_ratio, lay) + added;
+  Vec2 axis = slides.principal();
+  if (axis.isZero()) axis = holds.principal();
+  // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
+  const Vec3 way = surface_gradient(axis.x() * place.du + axis.y() * place.dv, normal);
+  const double length = way.norm();
+  if (length > 0.0) state.across = way / length;
+  const Vec3 kept = surface_gradient(state.across, normal);
+  const double rest = kept.norm();
+  if (axis.isZero()) axis = Vec2::UnitX();
+  const Vec2 aside(-axis.y(), axis.x());
+  coefficients.still = holds.along(axis);
+  coefficients.sliding = slides.along(axis);
+  if (rest > 0.0) {
+    const auto ratio = [](double along, double across) { return across > 0.0 ? std::min(1.0, along / across) : 1.0; };
+    coefficients.across = kept / rest;
+    coefficients.still_ratio = ratio(holds.along(aside), coefficients.still);
+    coefficients.sliding_ratio = ratio(slides.along(aside), coefficients.sliding);
+  }
+  coefficients.formulation = settings.lay.formulation;
 }
 
 void add_friction(const Instance& instance, const Material& material, double stiffness, const MappedPlaces& places,
@@ -197,47 +276,29 @@ void add_friction(const Instance& instance, const Material& material, double sti
   FrictionCoefficients& coefficients = contact.coefficients;
   coefficients.still = std::max(material.static_friction, material.dynamic_friction);
   coefficients.sliding = material.dynamic_friction;
-  if (const FineFeatures* fine = instance.fine.get(); fine != nullptr && fine->shapes_friction() && !places.empty()) {
-    const FineSettings& settings = fine->settings();
-    double factor = 1.0;
-    if (settings.friction_map.factors != nullptr) {
-      factor = 0.0;
-      for (const MappedPlace& place : places) {
-        const Vec2 st = place.uv.cwiseQuotient(settings.friction_map.tile);
-        factor += place.weight * std::max(0.0, settings.friction_map.factors->height_at(st));
-      }
-    }
-    const double still_along = factor * coefficients.still * settings.lay.still_ratio + fine->interlock_along();
-    const double sliding_along = factor * coefficients.sliding * settings.lay.sliding_ratio + fine->interlock_along();
-    coefficients.still = factor * coefficients.still + fine->interlock_across();
-    coefficients.sliding = factor * coefficients.sliding + fine->interlock_across();
-    // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
-    const MappedPlace& place = places[0];
-    const Vec2 across = fine->across(place.uv);
-    const Vec3 way = surface_gradient(across.x() * place.du + across.y() * place.dv, law.normal);
-    const double length = way.norm();
-    if (length > 0.0) slot.texture.across = way / length;
-    const Vec3 kept = surface_gradient(slot.texture.across, law.normal);
-    const double rest = kept.norm();
-    if (rest > 0.0) {
-      coefficients.across = kept / rest;
-      coefficients.still_ratio = coefficients.still > 0.0 ? std::min(1.0, still_along / coefficients.still) : 1.0;
-      coefficients.sliding_ratio =
-          coefficients.sliding > 0.0 ? std::min(1.0, sliding_along / coefficients.sliding) : 1.0;
-    }
-    coefficients.formulation = settings.lay.formulation;
-  }
-  const double before = friction_energy(material.friction, stiffness, slot.friction);
+  if (const FineFeatures* fine = instance.fine.get(); fine != nullptr && fine->shapes_friction() && !places.empty())
+    shape_friction(*fine, places, law.normal, slot.texture, coefficients);
+  const double before = friction_energy(slot.friction);
   const Vec3 force = friction_force(material.friction, contact, slot.friction);
-  law.held = friction_energy(material.friction, stiffness, slot.friction);
+  law.held = friction_energy(slot.friction);
   tank.fill(before - law.held - force.dot(motion.moved));
   law.friction = force;
   law.force += force;
 }
 
+/// Whether there is any friction to be felt.
+bool resists(const Instance& instance, const Material& material) noexcept {
+  const FrictionLaw& law = material.friction;
+  return material.static_friction > 0.0 || material.dynamic_friction > 0.0 || law.viscosity > 0.0 ||
+         law.break_away > 0.0 || (instance.fine != nullptr && instance.fine->interlocks());
+}
+
+/// What was given stays on the book: a debt is not forgotten by lifting off.
 void let_go(ContactState& slot) noexcept {
   slot.friction = {};
-  slot.texture = {};
+  slot.texture.held = false;
+  slot.texture.force = Vec3::Zero();
+  slot.texture.potential = 0.0;
 }
 
 }  // namespace
@@ -255,8 +316,8 @@ bool adds_friction(const Instance& instance) noexcept {
   return instance.material.friction_named || (instance.fine != nullptr && instance.fine->shapes_friction());
 }
 
-bool add_fine_forces(const Instance& instance, const Material& material, double stiffness, const FineMotion& motion,
-                     ContactState& slot, EnergyTank& tank, LawForce& law) noexcept {
+bool add_fine_forces(const Instance& instance, const Material& material, bool friction, double stiffness,
+                     const FineMotion& motion, ContactState& slot, EnergyTank& tank, LawForce& law) noexcept {
   if (!law.contact || !(law.push > 0.0)) {
     let_go(slot);
     return false;
@@ -277,21 +338,26 @@ bool add_fine_forces(const Instance& instance, const Material& material, double 
       if (from_coat && relief != nullptr) {
         texture = sample_coat(*relief, settings.formulation, law.element, law.point, slot.hint.relief.frame);
         highest = relief->coat().highest();
+        if (from_behind(*relief, law.element, law.normal)) {
+          texture = {-texture.height, -texture.gradient, texture.faded};
+          highest = -relief->coat().lowest();
+        }
       } else {
-        texture = sample_features(settings, places, law.normal, motion, settings.resolution);
+        texture = sample_features(*fine, places, law.normal, motion, settings.resolution);
       }
       faded = texture.faded;
       if (literal) {
         add_printed_texture(texture, law);
       } else if (!add_relief_texture(texture, highest, stiffness, motion.moved, slot.texture, law)) {
         // In a valley of the relief: nothing is touched.
-        let_go(slot);
+        slot.friction = {};
         law.contact = false;
         return faded;
       }
     }
   }
-  if (adds_friction(instance)) add_friction(instance, material, stiffness, places, motion, slot, tank, law);
+  if (friction && resists(instance, material))
+    add_friction(instance, material, stiffness, places, motion, slot, tank, law);
   return faded;
 }
 
@@ -306,10 +372,14 @@ TextureShape texture_at(const Instance& instance, std::uint32_t element, const V
     ReliefFrame frame;
     texture = sample_coat(*relief, settings.formulation, element, point, frame);
     highest = relief->coat().highest();
+    if (from_behind(*relief, element, normal)) {
+      texture = {-texture.height, -texture.gradient, texture.faded};
+      highest = -relief->coat().lowest();
+    }
   } else {
     MappedPlaces places;
     place_contact(instance, element, point, hint, places);
-    texture = sample_features(settings, places, normal, {}, resolution);
+    texture = sample_features(*instance.fine, places, normal, {}, resolution);
   }
   if (settings.formulation == Formulation::literal) highest = 0.0;
   return {texture.height - highest, surface_gradient(texture.gradient, normal)};

@@ -19,10 +19,10 @@ struct FineMotion {
 };
 
 /// Adds texture and friction to what a law answers, object frame; `law.push` is the constraint's force along the
-/// normal. Forgets what it knew where there is no contact. True where a texture was felt weaker than it is.
-/// `stiffness`: of the contact's spring (N/m). [servo]
-bool add_fine_forces(const Instance& instance, const Material& material, double stiffness, const FineMotion& motion,
-                     ContactState& slot, EnergyTank& tank, LawForce& law) noexcept;
+/// normal. Forgets what it knew where there is no contact. True where a texture was felt weaker than it is. `friction`:
+/// what adds_friction answers; `stiffness`: of the contact's spring (N/m). [servo]
+bool add_fine_forces(const Instance& instance, const Material& material, bool friction, double stiffness,
+                     const FineMotion& motion, ContactState& slot, EnergyTank& tank, LawForce& law) noexcept;
 
 /// A texture as it is at a place of its surface.
 struct TextureShape {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "asperity/core/formulation.h"
@@ -27,14 +28,34 @@ struct FrictionLay {
   double sliding_ratio = 1.0;  ///< dynamic one, likewise
   /// literal: eq. 15, interpolated by the velocity's angle to the gradient; consistent: elliptic.
   Formulation formulation = Formulation::consistent;
-  /// Direction across the lay where no feature says it (rad from u towards v).
-  double direction = 0.0;
+  /// Direction across the lay (rad from u towards v). Without one it is that of the micro features, else of the first
+  /// texture that has one, else u.
+  std::optional<double> direction;
 };
 
 /// Where the lateral force comes from.
 enum class TextureSource : std::uint8_t {
   features,  ///< procedural features and maps, by the mapping
   coat,      ///< the coat of a mesh that is felt as its bare base: its heights, and its normal map in the literal form
+};
+
+/// A coefficient of friction by direction in the plane of the features: e M e for a unit direction e.
+struct LayMatrix {
+  double uu = 0.0;
+  double uv = 0.0;
+  double vv = 0.0;
+  /// `across` the unit direction `axis`, `along` at right angles to it; `across` everywhere where the axis is zero.
+  static LayMatrix of(double across, double along, const Vec2& axis) noexcept {
+    if (axis.isZero()) return {across, 0.0, across};
+    const double more = across - along;
+    return {along + more * axis.x() * axis.x(), more * axis.x() * axis.y(), along + more * axis.y() * axis.y()};
+  }
+  LayMatrix operator+(const LayMatrix& other) const noexcept { return {uu + other.uu, uv + other.uv, vv + other.vv}; }
+  [[nodiscard]] double along(const Vec2& e) const noexcept {
+    return e.x() * e.x() * uu + 2.0 * e.x() * e.y() * uv + e.y() * e.y() * vv;
+  }
+  /// The unit direction of the largest coefficient; zero where all are alike. [servo]
+  [[nodiscard]] Vec2 principal() const noexcept;
 };
 
 /// Settings of FineFeatures.
@@ -71,13 +92,17 @@ class FineFeatures {
   [[nodiscard]] bool shapes_friction() const noexcept { return shapes_friction_; }
   /// Upper bound of the texture's height (m): what its crests are lowered by in the consistent form. [servo]
   [[nodiscard]] double highest() const noexcept { return highest_; }
-  /// What the micro features add to the coefficients across the lay and along it: their mean slopes, for a load is
-  /// carried up each of them and let fall behind it. [servo]
-  [[nodiscard]] double interlock_across() const noexcept { return interlock_across_; }
-  [[nodiscard]] double interlock_along() const noexcept { return interlock_along_; }
-  /// Direction across the lay in the plane of the features, unit: that of the roughest micro feature, or of the first
-  /// texture that has one, or the lay's own. Zero where that feature has none. [servo]
+  /// What the micro features add to both coefficients: along every direction the root of the sum of their squared mean
+  /// slopes, for a load is carried up each of them and let fall behind it. [servo]
+  [[nodiscard]] LayMatrix interlock(const Vec2& uv) const noexcept;
+  [[nodiscard]] bool interlocks() const noexcept { return !settings_.micro.empty(); }
+  /// Direction across the lay that the ratios go by, unit; zero where the feature that has it has none. [servo]
   [[nodiscard]] Vec2 across(const Vec2& uv) const noexcept;
+  /// Steepest slope of a texture feature where the mapping does not stretch it (m/m). [servo]
+  [[nodiscard]] double steepness(std::size_t texture) const noexcept { return steepness_[texture]; }
+  /// Steeper slopes are not rendered: a force 4 times the push. Where a mapping crowds a texture beyond that it is
+  /// felt weaker.
+  static constexpr double most_slope = 4.0;
 
  private:
   FineFeatures() = default;
@@ -85,9 +110,10 @@ class FineFeatures {
   FineSettings settings_;
   bool shapes_friction_ = false;
   double highest_ = 0.0;
-  double interlock_across_ = 0.0;
-  double interlock_along_ = 0.0;
-  std::size_t lay_feature_ = 0;  ///< of the micro features
+  LayMatrix interlock_;
+  Vec2 micro_across_ = Vec2::Zero();  ///< where the micro features are roughest; zero: alike in all directions
+  bool rings_ = false;                ///< the one micro feature is round: its lay turns with the place
+  std::vector<double> steepness_;
 };
 
 /// How much of a texture of some wavelength is felt, 0 to 1. Below two samples or two steps of the device a wavelength

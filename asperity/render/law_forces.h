@@ -21,8 +21,9 @@ struct LawForce {
   Vec3 friction = Vec3::Zero();  ///< N, the part of the force that is friction
   Vec3 texture = Vec3::Zero();   ///< N, the part that is texture
   double held = 0.0;             ///< J, in the spring of a friction law
-  Mat3 bend = Mat3::Zero();      ///< 1/m: how the normal changes along the surface (shape operator), where it is known
   Vec3 turn = Vec3::Zero();      ///< N, lateral force of consistent shading, to be added as far as its budget lets it
+  bool bends = false;            ///< `bend` is known
+  Mat3 bend;                     ///< 1/m: how the normal changes along the surface (shape operator)
 };
 
 /// haptic-textures-2005, 3.3; hrm-2010, Algorithm 1. `probe` and `velocity` in the object frame. [servo]

@@ -88,6 +88,7 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
       law.height = jet.height;
       if (instance.fine != nullptr) {
         const Mat3 bend = slot.side * parametric->shape_operator(jet);
+        law.bends = true;
         law.bend = at_origin ? bend : Mat3(pose.orientation * bend * pose.orientation.conjugate());
       }
     } else {

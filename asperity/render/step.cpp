@@ -132,9 +132,10 @@ LawForce added_force(const Instance& instance, const ProbeSample& probe, const V
       law.force = with_damping(law.force, law.normal, motion.velocity, material.damping);
     }
   }
-  if (instance.fine != nullptr || adds_friction(instance)) {
+  const bool adds = adds_friction(instance);
+  if (instance.fine != nullptr || adds) {
     const Material felt = elsewhere ? local_material(instance, law.point, slot.hint.sparse) : material;
-    if (add_fine_forces(instance, felt, felt.stiffness, motion, slot, tank, law))
+    if (add_fine_forces(instance, felt, adds, felt.stiffness, motion, slot, tank, law))
       tick.out.flags.set(TickFlag::texture_faded);
   }
   to_world(pose, law);
@@ -145,12 +146,12 @@ LawForce added_force(const Instance& instance, const ProbeSample& probe, const V
 void add_to_proxy(const Instance& instance, double share, const FineMotion& motion, ContactState& slot, Tick& tick,
                   EnergyTank& tank, ProxyAnswer::Part& part) noexcept {
   LawForce& law = part.law;
-  if (proxy_holds_friction(instance)) {
-    if (law.contact && instance.material.static_friction > 0.0)
+  const bool adds = adds_friction(instance);
+  if (!adds && instance.fine == nullptr) {
+    if (law.contact && instance.material.static_friction > 0.0 && proxy_holds_friction(instance))
       law.friction = law.force - law.force.dot(law.normal) * law.normal;
     return;
   }
-  if (instance.fine == nullptr && !adds_friction(instance)) return;
   const double stiffness = share * part.stiffness;
   law.push = stiffness * law.penetration;
   const Pose& pose = instance.world_from_object;
@@ -158,11 +159,14 @@ void add_to_proxy(const Instance& instance, double share, const FineMotion& moti
     law.force = pose.rotate_inverse(law.force);
     law.point = pose.apply_inverse(law.point);
     law.normal = pose.rotate_inverse(law.normal);
-    const Mat3 turn = pose.orientation.toRotationMatrix();
-    law.bend = turn.transpose() * law.bend * turn;
+    if (law.bends) {
+      const Mat3 turn = pose.orientation.toRotationMatrix();
+      law.bend = turn.transpose() * law.bend * turn;
+    }
   }
-  const Material material = local_material(instance, law.point, slot.hint.sparse);
-  if (add_fine_forces(instance, material, stiffness, motion, slot, tank, law))
+  const bool own = implicit_of(instance.surface) == nullptr;
+  const Material local = own ? Material{} : local_material(instance, law.point, slot.hint.sparse);
+  if (add_fine_forces(instance, own ? instance.material : local, adds, stiffness, motion, slot, tank, law))
     tick.out.flags.set(TickFlag::texture_faded);
   to_world(pose, law);
 }
@@ -241,17 +245,27 @@ void add_effects(const Scene& scene, int level, const ProbeSample& probe, ForceS
 }
 
 /// Of another scene nothing is known, except where the same volume is touched at another threshold or by another law,
-/// and that a law without a proxy has come in from the front.
+/// that a law without a proxy has come in from the front, and what friction and texture hold.
 void forget_contacts(const Scene& scene, ProxyState& state) noexcept {
   for (std::size_t i = state.contacts.size(); i-- > 0;) {
     ContactState& slot = state.contacts[i];
     const Instance* instance = slot.instance < scene.instances().size() ? &scene.instances()[slot.instance] : nullptr;
     const IsoSurface* iso = instance != nullptr ? iso_of(instance->surface) : nullptr;
+    const bool same_law = instance != nullptr && slot.law == instance->law.index();
     if (iso == nullptr) {
-      state.contacts.swap_remove(i);
+      // A proxy finds its surface again by itself. What friction and texture hold of the hand goes on.
+      if (!same_law || !constrains(instance->law)) {
+        state.contacts.swap_remove(i);
+        continue;
+      }
+      ContactState fresh;
+      fresh.instance = slot.instance;
+      fresh.law = slot.law;
+      fresh.friction = slot.friction;
+      fresh.texture = slot.texture;
+      slot = fresh;
       continue;
     }
-    const bool same_law = slot.law == instance->law.index();
     const bool same_field = iso->field().identity() == slot.iso.field;
     if (same_law && same_field) continue;
     const bool pushed = slot.touching && !constrains(instance->law);
@@ -267,6 +281,10 @@ void forget_contacts(const Scene& scene, ProxyState& state) noexcept {
       fresh.iso.field = slot.iso.field;
       fresh.iso.threshold = slot.iso.threshold;
       fresh.iso.level = slot.iso.level;
+    }
+    if (same_law) {
+      fresh.friction = slot.friction;
+      fresh.texture = slot.texture;
     }
     slot = fresh;
   }

@@ -26,11 +26,12 @@ struct IsoContact {
 
 /// What one probe remembers of a texture that it touches.
 struct TextureState {
-  bool held = false;           ///< the rest is of a contact that goes on
-  Vec3 force = Vec3::Zero();   ///< of the texture at the last tick (N, object frame)
-  double potential = 0.0;      ///< of the texture at the last tick (J)
+  bool held = false;           ///< the next three are of the last tick
+  Vec3 force = Vec3::Zero();   ///< of the relief (N, object frame)
+  double potential = 0.0;      ///< of the relief (J)
+  double penetration = 0.0;    ///< to the relief (m); below 0 over a valley
   double book = 0.0;           ///< J: what it has taken beyond what its potential holds; below 0: given
-  Vec3 across = Vec3::Zero();  ///< direction of the lay's gradient, where it was known last
+  Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last
 };
 
 /// What one probe remembers of one instance between ticks.

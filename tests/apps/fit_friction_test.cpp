@@ -106,6 +106,7 @@ TEST_F(FitFriction, RefusesOneByOne) {
   refused("unnamed.csv --stiffness 168N/m --speed -1mm/s", "--speed");
   refused("unnamed.csv --stiffness soft --speed 1mm/s", "--stiffness");
   const std::string both = "slip_k168Nm_v2000.csv slip_k400Nm_v2000.csv ";
+  refused(both + "./slip_k168Nm_v2000.csv", "named twice");
   refused(both + "--laws karnop", "karnopp");
   refused(both + "--fit k999", "--fit");
   refused(both + "--fit v2000", "2 files");

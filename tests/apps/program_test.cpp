@@ -274,6 +274,43 @@ TEST_F(Program, InspectProposesFrictionFromATopography) {
   refused("inspect grooves.png --friction 9", {"--friction"});
 }
 
+TEST_F(Program, InspectTellsFeaturesOfAScene) {
+  const Call call = run("inspect vase --friction 0.3 --json");
+  ASSERT_EQ(call.code, 0) << call.err;
+  const json feature = json::parse(call.out)["features"][0];
+  // c cos(2 pi u / L), c = 0.25 mm, L = 4.5 mm: R_a = 2 c / pi, R_q = c / sqrt 2, mean slope 4 c / L.
+  EXPECT_EQ(feature["felt_as"], "texture");
+  EXPECT_NEAR(feature["across"]["r_a_m"].get<double>(), 1.5915e-4, 1e-8);
+  EXPECT_NEAR(feature["across"]["r_q_m"].get<double>(), 1.7678e-4, 1e-8);
+  EXPECT_NEAR(feature["across"]["mean_slope"].get<double>(), 0.2222, 1e-4);
+  EXPECT_NEAR(feature["along"]["r_a_m"].get<double>(), 0.0, 1e-15);
+  EXPECT_NEAR(feature["friction_proposed"]["across"].get<double>(), 0.5222, 1e-4);
+  EXPECT_NEAR(feature["friction_proposed"]["along"].get<double>(), 0.3, 1e-9);
+  const json waves = feature["under_the_stroke"];
+  EXPECT_NEAR(waves["shortest_wave_m"].get<double>(), 1.5e-3, 1e-5);
+  EXPECT_NEAR(waves["longest_wave_m"].get<double>(), 4.5e-3, 1e-5);
+  EXPECT_LT(waves["felt_roughness_of_shortest"], waves["felt_roughness_of_longest"]);
+  EXPECT_LT(waves["felt_roughness_of_longest"], waves["felt_roughness_of_roughest"]);
+  EXPECT_TRUE(has(run("inspect vase").out, "finest waves feel smoothest, although the force")) << call.out;
+}
+
+TEST_F(Program, InspectTellsATopographyThatNoSheetHolds) {
+  // Columns 30 m apart in height by turns, 100 m wide: a slope of 0.3 along the width.
+  Image columns{32, 16, 1, 16, {}};
+  for (int i = 0; i < 32 * 16; ++i) columns.samples.push_back(static_cast<std::uint16_t>(65535 * (i % 2)));
+  ASSERT_TRUE(write_png(folder_ / "peak.png", columns).ok());
+  write("peak.json", R"({"width":32,"height":16,"pixel_size_m":[100,100],"height_min_m":1000,"height_max_m":1030})");
+  const Call call = run("inspect peak.png --json");
+  ASSERT_EQ(call.code, 0) << call.err;
+  const json document = json::parse(call.out);
+  EXPECT_EQ(document["kind"], "map");
+  EXPECT_TRUE(has(document["facts"]["size as it is"].get<std::string>(), "3.2e+03 m x 1.6e+03 m"));
+  EXPECT_EQ(document["facts"]["friction proposed"], "0.5 along the width, 0.2 along the height");
+  EXPECT_TRUE(has(document["to_know"].dump(), "too large for the trial sheet")) << call.out;
+  EXPECT_TRUE(has(document["to_know"].dump(), "magnify")) << call.out;
+  refused("inspect map.png --height 1000m", {"half the diagonal"});
+}
+
 TEST_F(Program, ScenesAndSchemaPrint) {
   const Call list = run("scenes");
   EXPECT_EQ(list.code, 0);

@@ -433,6 +433,25 @@ TEST_F(FineScene, WhatCannotBeRenderedIsSaid) {
   EXPECT_TRUE(has_note(e, "100 levels of 20 um and 20 samples of the shortest wave"));
 }
 
+TEST_F(FineScene, WavesAreToldAsTheMappingLaysThem) {
+  // Texture coordinates from 0 to 1 over 100 mm x 60 mm: tiles of 200 mm x 60 mm halve waves along x.
+  const Experiment halved = good(sheet(texture(millimetre, R"("mapping":{"surface":"uv","tile":[0.2,0.06]})")));
+  EXPECT_TRUE(has_note(halved, "grating of 500 um under the stroke"));
+  // A plane at right angles to the sheet: u runs out of it.
+  const Experiment upright =
+      good(sheet(texture(millimetre, R"("mapping":{"surface":"plane","axis":[1,0,0],"reference":[0,1,0]})")));
+  EXPECT_TRUE(has_note(upright, "does not change along the surface under the stroke"));
+  EXPECT_FALSE(has_note(upright, "levels"));
+}
+
+TEST_F(FineScene, WhatCannotCarryGeometryIsNamedAsWritten) {
+  const char* wide = R"({"type":"grating","amplitude":"0.2 mm","wavelength":"8 mm","direction":"90 deg"})";
+  refused(sheet(texture(wide, R"("mapping":{"surface":"sphere"})")), "texture.mapping.surface", "\"sphere\"");
+  refused(formula(R"("sphere","radius":0.03)",
+                  texture(R"({"type":"grating","amplitude":"0.2 mm","count":20,"as":"geometry"})")),
+          "texture.features", "poles");
+}
+
 // ---- friction ----
 
 TEST_F(FineScene, FrictionIsANameOrAnObject) {
@@ -479,7 +498,7 @@ TEST_F(FineScene, LayAndMapOfFrictionNeedNoTexture) {
   EXPECT_DOUBLE_EQ(fine(e).lay.still_ratio, 0.5);
   EXPECT_DOUBLE_EQ(fine(e).lay.sliding_ratio, 0.25);
   EXPECT_EQ(fine(e).lay.formulation, Formulation::literal);
-  EXPECT_NEAR(fine(e).lay.direction, pi / 2.0, 1e-15);
+  EXPECT_NEAR(fine(e).lay.direction.value_or(0.0), pi / 2.0, 1e-15);
   EXPECT_EQ(fine(e).friction_map.tile, Vec2(0.008, 0.004));
   EXPECT_NEAR(fine(e).friction_map.factors->lowest(), 0.5, 1e-6);
   EXPECT_NEAR(fine(e).friction_map.factors->highest(), 2.0, 1e-6);
@@ -492,6 +511,19 @@ TEST_F(FineScene, LayAndMapOfFrictionNeedNoTexture) {
   EXPECT_NEAR(fine(turned).friction_map.factors->highest(), 1.0, 1e-6);
   EXPECT_EQ(fine(turned).mapping.settings().surface, IntermediateSurface::cylinder);
   comes_back(turned);
+}
+
+TEST_F(FineScene, FrictionThatResistsNothingIsSaid) {
+  for (const std::string& name : friction_names()) {
+    EXPECT_TRUE(has_note(good(box(R"("material":{"friction":")" + name + "\"}")), "resists nothing")) << name;
+    const Experiment resists = good(material(R"("friction":")" + name + "\""));
+    EXPECT_EQ(has_note(resists, "resists nothing"), name == "viscous") << name;
+    const bool unread = name == "coulomb" || name == "dahl" || name == "hayward-armstrong";
+    EXPECT_EQ(has_note(resists, "does not read the static_friction"), unread) << name;
+    EXPECT_EQ(has_note(resists, "reads neither"), name == "viscous") << name;
+  }
+  EXPECT_TRUE(has_note(good(box(R"("material":{"lay":{"still_ratio":0.5}})")), "the lay resists nothing"));
+  EXPECT_FALSE(has_note(good(box(R"("material":{"friction":{"law":"karnopp","break_away":1}})")), "resists nothing"));
 }
 
 TEST_F(FineScene, FrictionRefusesWhatIsWrong) {

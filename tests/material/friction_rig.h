@@ -59,7 +59,7 @@ struct FrictionRig {
     for (int tick = 0; tick < ticks; ++tick) force = move(velocity * contact.dt.count());
     return force;
   }
-  [[nodiscard]] double energy() const { return friction_energy(law, contact.stiffness, state); }
+  [[nodiscard]] double energy() const { return friction_energy(state); }
 };
 
 /// A plane in z = 0, 0.6 N of push.

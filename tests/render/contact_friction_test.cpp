@@ -230,6 +230,100 @@ TEST(ContactFriction, Micro_features_add_their_mean_slope_across_the_lay) {
   EXPECT_NEAR(along.parts.friction.norm(), 0.3 * push, 1e-6);
 }
 
+/// Force of steady sliding along x and along y with these micro features, over that without any (0.3 N pushes).
+Vec2 added_by(std::vector<SurfaceFeature> micro) {
+  Instance instance = rough(FrictionKind::implicit_coulomb);
+  FineSettings settings = fine_settings({});
+  settings.micro = std::move(micro);
+  instance.fine = fine(settings);
+  const Scene scene = scene_with(instance);
+  return {stroke(scene, drag(Vec3::UnitX(), 0.01, 0.05)).back().parts.friction.norm() / push - 0.3,
+          stroke(scene, drag(Vec3::UnitY(), 0.01, 0.05)).back().parts.friction.norm() / push - 0.3};
+}
+
+TEST(ContactFriction, Micro_features_are_added_whatever_way_they_lie) {
+  constexpr double quarter = 0.5 * std::numbers::pi;
+  const Vec2 along_v = added_by({grating(1e-6, 100e-6, quarter)});
+  EXPECT_NEAR(along_v.x(), 0.0, 1e-6);
+  EXPECT_NEAR(along_v.y(), 0.04, 1e-6);
+  const Vec2 crossed = added_by({grating(1e-6, 100e-6), grating(1e-6, 100e-6, quarter)});
+  EXPECT_NEAR(crossed.x(), 0.04, 1e-6);
+  EXPECT_NEAR(crossed.y(), 0.04, 1e-6);
+  // A measured topography: stripes across u, as a map.
+  std::vector<float> heights(64 * 64);
+  for (std::size_t i = 0; i < heights.size(); ++i)
+    heights[i] = static_cast<float>(1e-6 * std::cos(2.0 * std::numbers::pi * static_cast<double>(i % 64) / 16.0));
+  FeatureSpec map;
+  map.kind = FeatureKind::map;
+  map.wavelength = {400e-6, 400e-6};
+  map.heights = std::make_shared<const HeightMap>(
+      must(HeightMap::build(heights, 64, 64, Wrap::repeat, Reconstruction::quadratic_bspline)));
+  const Vec2 striped = added_by({must(SurfaceFeature::build(map))});
+  EXPECT_NEAR(striped.x(), 0.04, 0.004);
+  EXPECT_NEAR(striped.y(), 0.0, 0.002);
+}
+
+TEST(ContactFriction, An_explicit_lay_stands_beside_textures_and_micro_features) {
+  Instance instance = rough(FrictionKind::implicit_coulomb);
+  FineSettings settings = fine_settings({});
+  settings.lay.still_ratio = settings.lay.sliding_ratio = 0.0;
+  settings.lay.direction = 0.0;
+  FeatureSpec noise;
+  noise.kind = FeatureKind::noise;
+  noise.roughness = 1e-8;
+  noise.correlation_length = 50e-6;
+  settings.micro.push_back(must(SurfaceFeature::build(noise)));
+  settings.texture.push_back(grating(1e-6, 2e-3, 0.5 * std::numbers::pi));
+  instance.fine = fine(settings);
+  const Scene scene = scene_with(instance);
+  EXPECT_NEAR(stroke(scene, drag(Vec3::UnitX(), 0.01, 0.05)).back().parts.friction.norm(), 0.3 * push, 0.01 * push);
+  EXPECT_LT(stroke(scene, drag(Vec3::UnitY(), 0.01, 0.05)).back().parts.friction.norm(), 0.01 * push);
+}
+
+TEST(ContactFriction, A_new_scene_does_not_let_go) {
+  for (const FrictionKind kind : all_kinds()) {
+    if (kind == FrictionKind::viscous || kind == FrictionKind::coulomb) continue;
+    Instance instance = rough(kind);
+    instance.material.friction.stiffness = 500.0;
+    const Scene scene = scene_with(instance);
+    const Scene again = scene_with(instance);
+    ProxyState state;
+    touch(scene, state, {0.0, 0.0, 0.001});
+    touch(scene, state, {0.0, 0.0, -depth});
+    const Vec3 held = touch(scene, state, {3e-4, 0.0, -depth}).parts.friction;
+    const Vec3 after = touch(again, state, {3e-4, 0.0, -depth}).parts.friction;
+    EXPECT_GT(held.norm(), 0.05) << friction_name(kind);
+    EXPECT_NEAR((after - held).norm(), 0.0, 1e-9) << friction_name(kind);
+  }
+}
+
+TEST(ContactFriction, A_law_changed_while_it_holds_gives_no_energy) {
+  for (const FrictionKind kind : all_kinds()) {
+    Instance soft = rough(FrictionKind::karnopp);
+    soft.material.friction.stiffness = 200.0;
+    Instance stiff = rough(kind);
+    if (kind != FrictionKind::viscous && kind != FrictionKind::coulomb) stiff.material.friction.stiffness = 4000.0;
+    const Scene scenes[] = {scene_with(soft), scene_with(stiff)};
+    ProxyState state;
+    touch(scenes[0], state, {0.0, 0.0, 0.001});
+    double given = 0.0;
+    Vec3 before(0.0, 0.0, -depth);
+    touch(scenes[0], state, before);
+    double held = 0.0;
+    for (int i = 0; i < 4000; ++i) {
+      const double a = 0.02 * i;
+      const Vec3 at(5e-4 * std::sin(a), 0.0, -depth);
+      ProbeSample probe = probe_at(at);
+      probe.twist.linear = (at - before) / tick.count();
+      const ForceSample sample = step(scenes[(i / 37) % 2], state, probe, tick);
+      given += sample.parts.friction.dot(at - before);
+      held = sample.parts.held;
+      before = at;
+      ASSERT_LE(given + held, 1e-12) << friction_name(kind) << " " << i;
+    }
+  }
+}
+
 TEST(ContactFriction, A_replay_is_bit_equal) {
   for (const FrictionKind kind : all_kinds()) {
     Instance instance = rough(kind);

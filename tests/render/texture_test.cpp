@@ -24,6 +24,17 @@ std::vector<Vec3> along_x(double from, double to, int count) {
   return path;
 }
 
+TEST(Texture, Y_3_a_smooth_plane_gives_the_hands_own_tremor_and_no_line) {
+  const Scene scene = scene_with(instance_of(flat_square()));
+  std::vector<Vec3> path = along_x(-0.02, 0.02, 2000);
+  for (std::size_t i = 30; i < path.size(); ++i) path[i].z() += 5e-5 * std::sin(0.06 * static_cast<double>(i));
+  const std::vector<ForceSample> shaken = stroke(scene, path);
+  for (std::size_t i = 30; i < path.size(); ++i) {
+    EXPECT_NEAR(shaken[i].wrench.force.z(), -stiffness * path[i].z(), 1e-9);
+    EXPECT_NEAR(shaken[i].wrench.force.head<2>().norm(), 0.0, 1e-12);
+  }
+}
+
 TEST(Texture, Y_3_a_smooth_plane_gives_a_constant_force) {
   const Scene scene = scene_with(instance_of(flat_square()));
   const std::vector<ForceSample> samples = stroke(scene, along_x(-0.02, 0.02, 2000));
@@ -162,6 +173,105 @@ TEST(Texture, A_loop_around_a_ball_gives_nothing) {
   // Ten rounds: it may hold what the spring holds, and give back no more than that.
   EXPECT_LT(absorbed, -1e-4);
   EXPECT_LT(work, 2e-5);
+}
+
+/// Work done on a probe led along a closed path again and again, more than it took (J).
+double given_in_rounds(const Scene& scene, std::span<const Vec3> round, int rounds) {
+  ProxyState state;
+  double work = 0.0;
+  double most = -infinity;
+  Vec3 before = round.front();
+  Vec3 force = touch(scene, state, before).wrench.force;
+  for (int i = 0; i < rounds; ++i) {
+    for (const Vec3& position : round) {
+      const Vec3 now = touch(scene, state, position).wrench.force;
+      work += 0.5 * (now + force).dot(position - before);
+      force = now;
+      before = position;
+    }
+    most = std::max(most, work);
+  }
+  return most;
+}
+
+TEST(Texture, Touching_again_and_again_gives_nothing) {
+  // A ball that rolls over the edges of a coarse sphere, lifts off and comes again: the foot is not where the potential
+  // has it, and what it gives must not start anew with every touch.
+  Instance coarse = instance_of(bare(icosphere(2, 0.03)));
+  coarse.sides = Sides::front;
+  coarse.fine = fine(fine_settings({grating(0.1e-3, 2e-3)}));
+  const Scene ball = scene_with(coarse, 0.01);
+  std::vector<Vec3> round;
+  for (int i = 0; i < 2000; ++i) {
+    const double a = 2.0 * pi * i / 2000.0;
+    const double reach = 0.0395 + 0.0012 * std::sin(17.0 * a);
+    round.emplace_back(reach * std::cos(0.5 * std::sin(a)), reach * std::sin(0.5 * std::sin(a)), 0.003 * std::cos(a));
+  }
+  EXPECT_LT(given_in_rounds(ball, round, 10), 1.5e-5);
+  // A texture on a relief: press, slide, lift, return.
+  Instance wavy = instance_of(coated(plane_grid(0.04, 0.04, 8, 8), wavy_map(0.2e-3, 64), Mapping::uv, 0.04));
+  wavy.fine = fine(fine_settings({grating(0.02e-3, 1e-3)}));
+  const Scene rough = scene_with(wavy);
+  std::vector<Vec3> press = line({0.001, 0.0005, 0.001}, {0.001, 0.0005, -0.0005}, 300);
+  for (const auto& [from, to] : {std::pair{Vec3(0.001, 0.0005, -0.0005), Vec3(0.0043, 0.0013, -0.0005)},
+                                 {Vec3(0.0043, 0.0013, -0.0005), Vec3(0.0043, 0.0013, 0.001)},
+                                 {Vec3(0.0043, 0.0013, 0.001), Vec3(0.001, 0.0005, 0.001)}}) {
+    const std::vector<Vec3> part = line(from, to, 300);
+    press.insert(press.end(), part.begin() + 1, part.end());
+  }
+  EXPECT_LT(given_in_rounds(rough, press, 20), 1.5e-5);
+}
+
+TEST(Texture, Where_a_mapping_crowds_the_force_stays_bounded) {
+  // The axis of the cylinder goes through the plane: waves get as fine as one likes.
+  FeatureMappingSettings mapping;
+  mapping.surface = IntermediateSurface::cylinder;
+  mapping.radius = 0.02;
+  Instance instance = instance_of(flat_square());
+  instance.fine = fine(fine_settings({grating(0.2e-3, 2.0 * pi * 0.02 / 20.0)}, Formulation::consistent, mapping));
+  const Scene scene = scene_with(instance);
+  ProxyState state;
+  touch(scene, state, {-5e-3, 1e-5, 1e-3});
+  for (int i = 0; i <= 2000; ++i) {
+    const ForceSample sample = touch(scene, state, {-5e-3 + 5e-6 * i, 1e-5, -depth});
+    EXPECT_LE(sample.wrench.force.norm(), 4.2 * stiffness * depth);
+  }
+}
+
+TEST(Texture, Slopes_beyond_what_can_be_rendered_are_refused) {
+  const auto built = FineFeatures::build(fine_settings({grating(5e-3, 1e-3)}));
+  ASSERT_FALSE(built);
+  EXPECT_NE(built.error().message().find("slopes"), std::string::npos) << built.error().message();
+}
+
+TEST(Texture, Erratum_c_the_printed_gradient_counts_the_angle_twice) {
+  // The ramp of section 3.1.3, in units of 10 mm: along theta the printed slope is (1 + 1/r) times the true one.
+  ParametricSettings formula;
+  formula.shape = ParametricShape::ramp;
+  formula.scale = 0.01;
+  const auto ramp = std::make_shared<const ParametricSurface>(must(ParametricSurface::build(formula)));
+  FeatureMappingSettings mapping;
+  mapping.surface = IntermediateSurface::cylinder;
+  mapping.radius = 0.01;
+  const SurfaceFeature waves = grating(0.02e-3, 2.0 * pi * 0.01 / 20.0);
+  for (const double r : {1.2, 2.0, 2.7}) {
+    const ParametricJet jet = ramp->jet({0.77, r});
+    const Vec3 way = jet.u.normalized();
+    const Vec3 normal = ramp->normal(jet);
+    double lateral[2];
+    int k = 0;
+    for (const Formulation formulation : {Formulation::literal, Formulation::consistent}) {
+      Instance instance = instance_of(ramp);
+      instance.fine = fine(fine_settings({waves}, formulation, mapping));
+      const Scene scene = scene_with(instance);
+      // So little pressed that the curve under the probe does not matter.
+      const ForceSample sample = poke(scene, jet.point + 1e-3 * normal, jet.point - 6e-5 * normal);
+      const double push =
+          formulation == Formulation::literal ? stiffness * 6e-5 : stiffness * sample.contact.penetration;
+      lateral[k++] = sample.wrench.force.dot(way) / push;
+    }
+    EXPECT_NEAR(lateral[0] / lateral[1], 1.0 + 1.0 / r, 0.02) << r;
+  }
 }
 
 TEST(Texture, The_same_on_every_provider) {
@@ -308,6 +418,15 @@ TEST(Texture, From_the_coat_of_a_mesh_felt_bare) {
     EXPECT_NEAR(sample.wrench.force.x(), -push * coat.gradient.x(), 1e-4 * push);
     EXPECT_NEAR(sample.wrench.force.y(), -push * coat.gradient.y(), 1e-4 * push);
     EXPECT_GT(sample.wrench.force.head<2>().norm(), 1e-3);
+    // From behind the same sheet is seen from its other side: bumps are hollows.
+    ProxyState behind;
+    touch(scene, behind, {0.0031, 0.0012, -0.001});
+    const ForceSample back = touch(scene, behind, {0.0031, 0.0012, depth});
+    const double pull = formulation == Formulation::literal
+                            ? stiffness * depth
+                            : stiffness * (depth - coat.height + relief->coat().lowest());
+    EXPECT_NEAR(back.wrench.force.z(), -pull, 1e-6);
+    EXPECT_NEAR(back.wrench.force.x(), pull * coat.gradient.x(), 1e-4 * pull);
   }
 }
 
