@@ -52,6 +52,35 @@ ProxyRest solve_on_smooth(const Instance& instance, const Friction& friction, co
   return solve_on_iso(felt_view(*proxied_iso(instance), slot), instance.sides, friction, from, probe, slot);
 }
 
+/// How the normal of a relief changes along it at a point (1/m, object frame).
+Mat3 bend_of(const ReliefPoint& point, const ReliefPlace& place) noexcept {
+  const ShellPrism& prism = place.frame.prism;
+  const Vec3 direction = prism.direction_at(place.u, place.v);
+  const HeightJet& h = point.jet;
+  ParametricJet jet;
+  jet.u = point.along_u;
+  jet.v = point.along_v;
+  Vec3 du;
+  Vec3 dv;
+  ParametricSurface::parameter_gradients(jet, du, dv);
+  const Vec3& n = point.outward;
+  const double uu = n.dot(h.uu * direction + 2.0 * h.u * prism.turn_u);
+  const double uv = n.dot(h.uv * direction + h.u * prism.turn_v + h.v * prism.turn_u);
+  const double vv = n.dot(h.vv * direction + 2.0 * h.v * prism.turn_v);
+  const Vec3 across = uu * du + uv * dv;
+  const Vec3 along = uv * du + vv * dv;
+  return -(across * du.transpose() + along * dv.transpose());
+}
+
+/// Tells what texture may go by, in the world frame.
+void set_bend(const Mat3& bend, const Pose& pose, LawForce& law) noexcept {
+  law.bends = true;
+  law.bend = bend;
+  if (pose.is_identity()) return;
+  const Mat3 turn = pose.orientation.toRotationMatrix();
+  law.bend = turn * bend * turn.transpose();
+}
+
 /// One smooth surface, touched by a point, or by a ball where the surface has one level further out for it.
 ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& from, const ProbeSample& probe,
                       double radius) noexcept {
@@ -83,14 +112,11 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
     if (proxied_relief(instance) != nullptr) {
       law.height = slot.point.jet.height;
       law.element = slot.hint.relief.frame.face;
+      if (instance.fine != nullptr) set_bend(slot.side * bend_of(slot.point, slot.hint.relief), pose, law);
     } else if (const ParametricSurface* parametric = proxied_parametric(instance)) {
       law.element = parametric->element_of(slot.hint.parametric.uv);
       law.height = jet.height;
-      if (instance.fine != nullptr) {
-        const Mat3 bend = slot.side * parametric->shape_operator(jet);
-        law.bends = true;
-        law.bend = at_origin ? bend : Mat3(pose.orientation * bend * pose.orientation.conjugate());
-      }
+      if (instance.fine != nullptr) set_bend(slot.side * parametric->shape_operator(jet), pose, law);
     } else {
       law.element = element_at(instance, rest.proxy - radius * rest.normal, slot);
     }
