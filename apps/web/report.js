@@ -126,11 +126,12 @@ window.addEventListener("error", (event) => {
   }
 
   function law_plot(parent, key, column, spec) {
-    const laws = data.laws;
-    const rows = overlay(laws.map((law) => law[key]), column);
+    // A law that has no such part is left out; the others keep their colours.
+    const laws = data.laws.map((law, k) => ({ name: law.law, part: law[key], k })).filter((law) => law.part);
+    const rows = overlay(laws.map((law) => law.part), column);
     // Laws often agree: every second line is dashed, so that the one under it still shows.
-    const series = Object.fromEntries(laws.map((law, k) => [law.law, { strokePattern: k % 2 === 1 ? [7, 4] : null }]));
-    plot(parent, { ...spec, rows, series, labels: ["x", ...laws.map((law) => law.law)], colours: laws.map((_, k) => law_colours[k % law_colours.length]) });
+    const series = Object.fromEntries(laws.map((law) => [law.name, { strokePattern: law.k % 2 === 1 ? [7, 4] : null }]));
+    plot(parent, { ...spec, rows, series, labels: ["x", ...laws.map((law) => law.name)], colours: laws.map((law) => law_colours[law.k % law_colours.length]) });
   }
 
   // --- parts that both kinds of page have ---
@@ -365,7 +366,7 @@ window.addEventListener("error", (event) => {
     section("Along the stroke");
     law_plot(page, "force_distance", 1, { title: "Normal force", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
     law_plot(page, "force_distance", 2, { title: "Tangential force", hint: "Along the direction of travel; negative resists.", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
-    if (data.laws.every((law) => law.parts_distance)) {
+    if (data.laws.some((law) => law.parts_distance)) {
       law_plot(page, "parts_distance", 1, { title: "Friction", hint: "Along the direction of travel; negative resists.", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
       law_plot(page, "parts_distance", 2, { title: "Lateral force of the texture", x: "distance (mm)", y: "N", unit: "mm", group: "distance" });
     }
