@@ -38,6 +38,7 @@ Status measure_all(const Options& options, Report& report) {
   std::vector<std::uint32_t> volumes = {32, 64, 128, 256, 512};
   std::vector<int> potentials = {3, 4, 5, 6, 8};
   std::vector<int> fine = {3};
+  std::vector<std::uint32_t> moved = {1000, 10000, 100000, 327000};
   int map_size = 1024;
   if (options.quick) {
     effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
@@ -45,6 +46,7 @@ Status measure_all(const Options& options, Report& report) {
     reliefs = {0, 3, 6};
     volumes = {32, 64, 128};
     potentials = {3, 4, 5};
+    moved = {1000, 10000};
     map_size = 256;
   }
   const auto asked = [&](const char* kind) { return options.only.empty() || options.only == kind; };
@@ -53,6 +55,7 @@ Status measure_all(const Options& options, Report& report) {
   if (!asked("volume")) volumes.clear();
   if (!asked("potential")) potentials.clear();
   if (!asked("fine")) fine.clear();
+  if (!asked("refit")) moved.clear();
   for (const int subdivisions : meshes) {
     say(fmt::format("icosphere of {} triangles", 20 << (2 * subdivisions)));
     ASPERITY_TRY(Group group, measure_mesh(subdivisions, effort, report.clock_cost));
@@ -76,6 +79,11 @@ Status measure_all(const Options& options, Report& report) {
   for (const int subdivisions : fine) {
     say(fmt::format("texture and friction on {} triangles", 20 << (2 * subdivisions)));
     ASPERITY_TRY(Group group, measure_fine(subdivisions, effort, report.clock_cost));
+    report.groups.push_back(std::move(group));
+  }
+  for (const std::uint32_t triangles : moved) {
+    say(fmt::format("moving {} triangles", triangles));
+    ASPERITY_TRY(Group group, measure_refit(triangles, effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
   say("");
@@ -112,8 +120,8 @@ int main(int argc, char** argv) {
     app.add_flag("--check", options.check,
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
-    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential or fine")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine"}));
+    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential, fine or refit")
+        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "refit"}));
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();

@@ -83,6 +83,8 @@ std::string text_of(const Group& group) {
     text = fmt::format("\n{} of {}: {:.1f} MB; mesh and search structure in {:.3f} s, potential in {:.3f} s\n",
                        group.kind, group.size(), static_cast<double>(group.coat_bytes) * 1e-6, group.mesh_build_seconds,
                        group.search_build_seconds);
+  } else if (group.kind == "refit") {
+    text += '\n';
   } else if (group.coat_bytes > 0) {
     text += fmt::format(", coat {:.1f} MB\n", static_cast<double>(group.coat_bytes) * 1e-6);
   } else {
@@ -91,12 +93,14 @@ std::string text_of(const Group& group) {
         "m\n",
         group.mesh_build_seconds, group.search_build_seconds, group.embree_build_seconds, group.largest_disagreement);
   }
-  text += fmt::format("{:<37}{:>8}{:>8}{:>9}{:>10} |{:>8}{:>8}{:>9}{:>10}\n", "ns", "p50", "p99", "p99.9", "max",
-                      "cold p50", "p99", "p99.9", "max");
+  // Whole meshes take milliseconds.
+  const double unit = group.kind == "refit" ? 1e3 : 1.0;
+  text += fmt::format("{:<37}{:>8}{:>8}{:>9}{:>10} |{:>8}{:>8}{:>9}{:>10}\n", unit > 1.0 ? "us" : "ns", "p50", "p99",
+                      "p99.9", "max", "cold p50", "p99", "p99.9", "max");
   for (const RowResult& row : group.rows) {
     text += fmt::format("{:<37}{:>8.0f}{:>8.0f}{:>9.0f}{:>10.0f} |{:>8.0f}{:>8.0f}{:>9.0f}{:>10.0f}\n", row.name,
-                        row.warm.p50, row.warm.p99, row.warm.p999, row.warm.max, row.cold.p50, row.cold.p99,
-                        row.cold.p999, row.cold.max);
+                        row.warm.p50 / unit, row.warm.p99 / unit, row.warm.p999 / unit, row.warm.max / unit,
+                        row.cold.p50 / unit, row.cold.p99 / unit, row.cold.p999 / unit, row.cold.max / unit);
   }
   return text;
 }
@@ -115,6 +119,8 @@ std::vector<Ratio> Report::ratios() const {
     add_ratio(ratios, group, god_object_radius, god_object_point, 1.5, 6.0);
     add_ratio(ratios, group, closest_coherent, embree_bounded, 0.0, 4.0);
     add_ratio(ratios, group, proxy_edge, proxy_inside, 2.0, 20.0);
+    add_ratio(ratios, group, mesh_refit, mesh_rebuild, 1.0, 2.0);
+    add_ratio(ratios, group, relief_refit, relief_rebuild, 1.0, 2.0);
   }
   add_flatness(ratios, groups, "relief", "base", 1.5);
   add_flatness(ratios, groups, "volume", "volume", 1.5);

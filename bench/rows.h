@@ -27,6 +27,12 @@ inline constexpr const char* bare_contact = "contact alone, no friction";
 
 inline constexpr const char* contact_point_friction = "virtual contact point, friction, smooth";
 
+inline constexpr const char* mesh_refit = "mesh, vertices moved";
+inline constexpr const char* mesh_refit_alone = "mesh, vertices moved, one thread";
+inline constexpr const char* mesh_rebuild = "mesh, built anew";
+inline constexpr const char* relief_refit = "relief, vertices moved";
+inline constexpr const char* relief_rebuild = "relief, built anew";
+
 /// What a part of the tick costs on top of the rest, the median of differences taken in turn.
 struct Extra {
   std::string what;
@@ -35,7 +41,7 @@ struct Extra {
 
 /// What was measured on one mesh.
 struct Group {
-  std::string kind;  ///< "mesh", "relief", "volume", "potential" or "fine"
+  std::string kind;  ///< "mesh", "relief", "volume", "potential", "fine" or "refit"
   std::size_t triangles = 0;
   std::uint32_t resolution = 0;       ///< of a volume: samples along each axis
   double mesh_build_seconds = 0.0;    ///< welding, checks, adjacency, normals
@@ -72,5 +78,9 @@ Result<Group> measure_potential(int subdivisions, const Effort& effort, double c
 /// The same mesh felt by its proxy alone, and with friction and texture as forces of their own on top: what they cost
 /// is measured against the bare contact in turn, a few ticks each, on the same slide. [build]
 Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_cost);
+
+/// What moving all vertices costs, in place of one update: a sheet of about so many triangles, bare and with a coat of
+/// 256 x 256 texels by triplanar mapping, refitted and built anew. [build]
+Result<Group> measure_refit(std::uint32_t triangles, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

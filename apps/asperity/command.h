@@ -44,6 +44,8 @@ CLI::App* add_replay(CLI::App& app, Console& console, Action& action);
 CLI::App* add_inspect(CLI::App& app, Console& console, Action& action);
 CLI::App* add_convert(CLI::App& app, Console& console, Action& action);
 CLI::App* add_fit_friction(CLI::App& app, Console& console, Action& action);
+CLI::App* add_score(CLI::App& app, Console& console, Action& action);
+CLI::App* add_library(CLI::App& app, Console& console, Action& action);
 CLI::App* add_scenes(CLI::App& app, Console& console, Action& action);
 CLI::App* add_bench(CLI::App& app, Console& console, Action& action);
 CLI::App* add_schema(CLI::App& app, Console& console, Action& action);

@@ -230,7 +230,7 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   const fs::path folder =
       options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
   std::vector<Rival> rivals;
-  for (const std::string& name : options.laws.empty() ? default_rivals(experiment.scene) : options.laws) {
+  for (const std::string& name : options.laws.empty() ? suitable_rivals(experiment) : options.laws) {
     ASPERITY_TRY(Rival rival, parse_rival(name));
     rivals.push_back(std::move(rival));
   }

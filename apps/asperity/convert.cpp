@@ -1,5 +1,5 @@
 // asperity convert: a volume into a bricked file, which is touched without being held in memory; a mesh into a level
-// set.
+// set; a mesh or a scene into glTF.
 
 #include <fmt/format.h>
 
@@ -14,11 +14,13 @@
 #include <vector>
 
 #include "apps/asperity/command.h"
+#include "apps/asperity/convert_gltf.h"
 #include "apps/asperity/convert_mesh.h"
 #include "asperity/core/units.h"
 #include "asperity/field/brick_file.h"
 #include "asperity/field/derived_fields.h"
 #include "asperity/field/volume_generators.h"
+#include "asperity/io/gltf_material.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/volume_io.h"
 
@@ -207,6 +209,11 @@ Result<int> convert(const ConvertOptions& options, const Console& console) {
       return refused("FILES", "a mesh is made into a level set", "the options of meshes: --resolution, --voxel, ...");
     return convert_mesh_file(options.files.front(), options.files.back(), options.mesh, console);
   }
+  if (options.files.size() == 2 && is_gltf_path(options.files.back())) {
+    if (options.of_volumes() || options.mesh.any())
+      return refused("FILES", "a mesh or a scene is written as glTF as it is", "no further options");
+    return convert_to_gltf(options.files.front(), options.files.back(), console);
+  }
   if (options.mesh.any())
     return refused("FILES", fmt::format("\"{}\" is no level set", options.files.back()),
                    "a name with .vdb for a mesh, without --resolution and the like for a volume");
@@ -239,12 +246,13 @@ CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
   CLI::App* command =
       app.add_subcommand("convert",
                          "Write a volume as a bricked file (.aspvol), which is touched without being held in "
-                         "memory; or a mesh as a level set (.vdb)");
+                         "memory; a mesh as a level set (.vdb); or a mesh or a scene as glTF (.glb, .gltf)");
   auto options = std::make_shared<ConvertOptions>();
   command
-      ->add_option("FILES", options->files,
-                   "The volume (.vtk, .vti, .vtr, .nrrd, .json sidecar, ...) and the .aspvol file to write; with "
-                   "--generator only the latter. Or a mesh and the .vdb file to write")
+      ->add_option(
+          "FILES", options->files,
+          "The volume (.vtk, .vti, .vtr, .nrrd, .json sidecar, ...) and the .aspvol file to write; with "
+          "--generator only the latter. Or a mesh and the .vdb file to write; or a mesh or scene and the .glb or .gltf")
       ->required()
       ->expected(1, 2);
   command->add_option("--array", options->array, "Which array of the volume");
@@ -277,6 +285,7 @@ CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
       "  asperity convert flow.vtr vortices.aspvol --array velocity --derive q_criterion --units mm\n"
       "  asperity convert scan.json scan.aspvol --fit 15cm\n"
       "  asperity convert bunny.obj bunny.vdb --resolution 512\n"
+      "  asperity convert scene.json relief.glb\n"
       "  asperity convert --generator sphere --size 1024 sphere.aspvol");
   command->callback(
       [options, &console, &action] { action = [options, &console] { return convert(*options, console); }; });

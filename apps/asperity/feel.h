@@ -8,8 +8,7 @@
 namespace asperity::program {
 
 /// What of a surface can be felt on the experiment's device, and what cannot: sentences with the numbers they rest on.
-/// Amplitude against the force a hand notices, detail against encoder and rate, crests against the contact's own depth
-/// (formulation D5). [main]
+/// Of a relief its height alone; whether it can be felt as it is: relief_advice.h. [main]
 std::vector<std::string> feel_of(const Experiment& experiment, const Instance& instance);
 
 }  // namespace asperity::program

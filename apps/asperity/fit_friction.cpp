@@ -12,14 +12,18 @@
 #include <memory>
 #include <set>
 
+#include "apps/asperity/minimiser.h"
 #include "apps/asperity/run.h"
 #include "asperity/io/atomic_file.h"
 #include "asperity/study/friction_report.h"
-#ifdef ASPERITY_HAS_NLOPT
-#include "asperity/study/nlopt/nlopt_minimiser.h"
-#endif
 
 namespace asperity::program {
+
+Minimiser& own_minimiser() {
+  static Minimiser minimiser;
+  return minimiser;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -41,15 +45,12 @@ struct FitFrictionOptions {
 };
 
 Result<Minimiser> minimiser() {
-#ifdef ASPERITY_HAS_NLOPT
-  return Minimiser(minimise_with_nlopt);
-#else
+  if (own_minimiser()) return own_minimiser();
   return Error{ErrorCode::file_unsupported,
                "friction is fitted with NLopt, which this program was built without",
                {},
                "fit-friction",
                "NLopt 2 (Debian: scripts/install-packages fitting) and a new build"};
-#endif
 }
 
 /// An option's quantity, above 0; nothing where it was not given.

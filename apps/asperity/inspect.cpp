@@ -14,6 +14,7 @@
 
 #include "apps/asperity/feature_facts.h"
 #include "apps/asperity/feel.h"
+#include "apps/asperity/relief_advice.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
 #include "asperity/field/brick_store.h"
@@ -42,6 +43,7 @@ struct Findings {
   std::vector<std::string> problems;  ///< what is wrong with it
   std::vector<std::string> felt;      ///< what can be felt of it
   Json features = Json::array();      ///< of a scene: its fine features in numbers
+  std::vector<ReliefAdvice> reliefs;  ///< whether they can be felt as they are
   void fact(std::string name, std::string value) { facts.push_back({std::move(name), std::move(value)}); }
 };
 
@@ -69,7 +71,7 @@ void mesh_facts(const TriangleMesh& mesh, Findings& found) {
 
 Result<Findings> inspect_trace(const std::string& file) {
   ASPERITY_TRY(const Trace trace, read_trace(file));
-  Findings found{"trace", {}, {}, {}, Json::array()};
+  Findings found{"trace", {}, {}, {}, Json::array(), {}};
   found.fact("ticks", fmt::format("{} at {:g} Hz", trace.records.size(), trace.metadata.rate));
   found.fact("written by", trace.metadata.program);
   found.fact("command", trace.metadata.command);
@@ -112,7 +114,7 @@ Json feature_json(const FeatureFact& fact) {
 }
 
 Findings scene_findings(const Experiment& experiment, double smooth) {
-  Findings found{"scene", {}, {}, {}, Json::array()};
+  Findings found{"scene", {}, {}, {}, Json::array(), {}};
   found.fact("name", experiment.name);
   for (const ReportFact& fact : setup_facts(experiment)) found.facts.push_back(fact);
   found.fact("duration", fmt::format("{:.3g} s, {} ticks", experiment.path.duration().count(),
@@ -126,6 +128,7 @@ Findings scene_findings(const Experiment& experiment, double smooth) {
   const std::vector<FeatureFact> features = feature_facts(experiment, smooth);
   for (const FeatureFact& fact : features) found.features.push_back(feature_json(fact));
   for (std::string& line : feature_lines(features, smooth)) found.felt.push_back(std::move(line));
+  found.reliefs = advise_on(experiment);
   return found;
 }
 
@@ -145,7 +148,7 @@ void add_scene_facts(const Findings& scene, Findings& found) {
 /// A mesh alone: the file as it is, then what can be felt of it with the defaults.
 Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(MeshSource source, read_mesh(options.file));
-  Findings found{"mesh", {}, {}, {}, Json::array()};
+  Findings found{"mesh", {}, {}, {}, Json::array(), {}};
   Result<TriangleMesh> mesh = TriangleMesh::build(std::move(source));
   if (!mesh) return std::move(mesh).error().in_file(options.file);
   const Vec3 extent = mesh->bounds().extent();
@@ -157,6 +160,7 @@ Result<Findings> inspect_mesh(const InspectOptions& options, const Progress& pro
     if (note.starts_with("implicit")) found.problems.push_back(note);
   }
   found.felt = scene.felt;
+  found.reliefs = scene.reliefs;
   return found;
 }
 
@@ -237,6 +241,11 @@ Status own_size_facts(const InspectOptions& options, const Image& image, Channel
       "it is too large for the trial sheet, so what can be felt of it there is not told: it {}; accepted: {}. A coat "
       "with \"magnify\": {:.2g} or less, which scales heights and size alike, can be laid on it",
       refusal.what, refusal.accepted, std::floor(most / digits) * digits));
+  const double magnify = std::floor(most / digits) * digits;
+  const double stiffness = sheet->scene.instances().front().material.stiffness;
+  found.reliefs.push_back(
+      advise_on(fmt::format("{}, magnified {:.2g} times", fs::path(options.file).stem().string(), magnify),
+                scaled(measure_shape(heights, own->tile), magnify, magnify), touch_conditions(*sheet, stiffness)));
   return success();
 }
 
@@ -246,10 +255,36 @@ bool too_high(const Error& error) {
          (error.place.ends_with("coat.height_map") || error.place.ends_with("coat.height"));
 }
 
+bool is_exr_file(const std::string& file) {
+  std::string extension = fs::path(file).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".exr";
+}
+
+/// What an OpenEXR image says of itself.
+Status float_facts(const InspectOptions& options, Findings& found) {
+  ASPERITY_TRY(const FloatImage image, read_float_image(options.file));
+  found.fact("pixels", fmt::format("{} x {}, floats", image.width, image.height));
+  found.fact("heights", fmt::format("{} channel: {}", image.channel, image.reason));
+  found.fact("values used", fmt::format("{:.6g} to {:.6g}: metres, unless --height says what they span",
+                                        static_cast<double>(image.lowest), static_cast<double>(image.highest)));
+  if (image.lowest == image.highest) found.problems.push_back("every pixel is equal: there is no relief in it");
+  return success();
+}
+
+Result<Findings> inspect_laid(const InspectOptions& options, Findings found, const Image* image, ChannelChoice choice,
+                              const Progress& progress);
+
 /// A map alone, laid on a sheet so that what can be felt of it has a size.
 Result<Findings> inspect_image(const InspectOptions& options, const Progress& progress) {
+  if (is_exr_file(options.file)) {
+    Findings found{"map", {}, {}, {}, Json::array(), {}};
+    ASPERITY_CHECK(float_facts(options, found));
+    return inspect_laid(options, std::move(found), nullptr, {}, progress);
+  }
   ASPERITY_TRY(const Image image, read_image(options.file));
-  Findings found{"map", {}, {}, {}, Json::array()};
+  Findings found{"map", {}, {}, {}, Json::array(), {}};
   found.fact("pixels", fmt::format("{} x {}", image.width, image.height));
   found.fact("channels", fmt::format("{} of {} bits", image.channels, image.bits));
   Result<ChannelChoice> choice = choose_channel(image, Channel::automatic);
@@ -262,6 +297,12 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   found.fact("values used",
              fmt::format("{:.3f} to {:.3f} of white", static_cast<double>(*low), static_cast<double>(*high)));
   if (*low == *high) found.problems.push_back("every pixel is equal: there is no relief in it");
+  return inspect_laid(options, std::move(found), &image, *choice, progress);
+}
+
+/// The map on a sheet, if it is not too high for one.
+Result<Findings> inspect_laid(const InspectOptions& options, Findings found, const Image* image, ChannelChoice choice,
+                              const Progress& progress) {
   InspectOptions laid = options;
   laid.scene.scene = "M_a-H_0";
   laid.scene.relief = options.file;
@@ -269,7 +310,11 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
   Result<Experiment> loaded = load_scene(laid.scene, progress);
   if (!loaded) {
     if (!too_high(loaded.error())) return std::move(loaded).error();
-    ASPERITY_CHECK(own_size_facts(options, image, choice->channel, std::move(loaded).error(), found));
+    if (image == nullptr) {
+      found.problems.push_back("in metres it is higher than a sheet to try it on is wide: --height says what it spans");
+      return found;
+    }
+    ASPERITY_CHECK(own_size_facts(options, *image, choice.channel, std::move(loaded).error(), found));
     return found;
   }
   const Experiment& experiment = *loaded;
@@ -281,6 +326,11 @@ Result<Findings> inspect_image(const InspectOptions& options, const Progress& pr
     if (fact.name.starts_with("surface")) found.fact("laid on a sheet", fact.value);
   }
   found.felt = scene.felt;
+  found.reliefs = scene.reliefs;
+  for (ReliefAdvice& advice : found.reliefs) {
+    advice.surface = fs::path(options.file).filename().string();
+    advice.base.reset();  // the sheet is for trial
+  }
   laid_facts(experiment, options.friction, found);
   return found;
 }
@@ -312,7 +362,7 @@ void array_facts(const VolumeSource& source, Findings& found) {
 /// A volume whose samples are read, then what can be felt of it with the defaults.
 Result<Findings> inspect_volume(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(const VolumeSource source, read_volume(options.file, {}, progress));
-  Findings found{"volume", {}, {}, {}, Json::array()};
+  Findings found{"volume", {}, {}, {}, Json::array(), {}};
   axis_facts(source.axes(), "of the file's unit", found);
   array_facts(source, found);
   found.fact("looked at", fmt::format("\"{}\"{}", source.array, source.cell_data ? ", in the cells' middles" : ""));
@@ -331,13 +381,14 @@ Result<Findings> inspect_volume(const InspectOptions& options, const Progress& p
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
   add_scene_facts(scene, found);
   found.felt = scene.felt;
+  found.reliefs = scene.reliefs;
   return found;
 }
 
 /// A .vdb file as it is, then what can be felt of it with the defaults.
 Result<Findings> inspect_sparse(const InspectOptions& options, const Progress& progress) {
   ASPERITY_TRY(SparseFile file, read_sparse(options.file, {}, progress));
-  Findings found{"level set", {}, {}, {}, Json::array()};
+  Findings found{"level set", {}, {}, {}, Json::array(), {}};
   for (const SparseGridEntry& entry : file.entries) {
     found.fact(fmt::format("grid \"{}\"", entry.name),
                fmt::format("{}, {}, {} points, voxel {:.6g}", entry.type, entry.grid_class, entry.points, entry.voxel));
@@ -352,6 +403,7 @@ Result<Findings> inspect_sparse(const InspectOptions& options, const Progress& p
   ASPERITY_TRY(const Findings scene, inspect_scene(options, progress));
   add_scene_facts(scene, found);
   found.felt = scene.felt;
+  found.reliefs = scene.reliefs;
   return found;
 }
 
@@ -359,7 +411,7 @@ Result<Findings> inspect_bricks(const std::string& file) {
   BrickSettings settings;
   settings.stream = false;
   ASPERITY_TRY(const std::unique_ptr<BrickStore> store, BrickStore::open(file, settings));
-  Findings found{"bricked volume", {}, {}, {}, Json::array()};
+  Findings found{"bricked volume", {}, {}, {}, Json::array(), {}};
   axis_facts(store->axes(0), "m", found);
   found.fact("array", fmt::format("\"{}\", {}, {:.6g} to {:.6g}", store->name(), to_string(store->type()),
                                   store->lowest(), store->highest()));
@@ -372,7 +424,7 @@ bool looks_like_image(const std::string& file) {
   std::string extension = fs::path(file).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg" || extension == ".exr";
 }
 
 Result<Findings> inspect_any(InspectOptions options, const Progress& progress) {
@@ -399,6 +451,13 @@ void print_findings(const std::string& file, const Findings& found) {
   for (const std::string& problem : found.problems) std::cout << "  - " << problem << '\n';
   if (!found.felt.empty()) std::cout << "What can be felt:\n";
   for (const std::string& line : found.felt) std::cout << "  - " << line << '\n';
+  for (const ReliefAdvice& advice : found.reliefs) {
+    const TouchConditions& t = advice.conditions;
+    std::cout << fmt::format("The relief of {} on {}, pressed with {:.3g} N at {:.3g} mm/s:\n", advice.surface,
+                             t.device.name, t.force, t.speed * 1e3);
+    for (const std::string& line : advice_lines(advice)) std::cout << "  - " << line << '\n';
+    std::cout << "On every device, at this stiffness or its own where that is less:\n" << device_table(advice);
+  }
 }
 
 Result<int> inspect(const InspectOptions& options, const Console& console) {
@@ -412,6 +471,7 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
                   {"to_know", found.problems},
                   {"felt", found.felt}};
     if (!found.features.empty()) document["features"] = found.features;
+    for (const ReliefAdvice& advice : found.reliefs) document["reliefs"].push_back(advice_json(advice));
     console.print(document);
   } else {
     print_findings(options.file, found);
@@ -427,11 +487,13 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
   auto options = std::make_shared<InspectOptions>();
   command
       ->add_option("FILE", options->file,
-                   "A mesh, a map (PNG, JPEG), a volume, a level set (.vdb), a scene, a built-in scene or a trace")
+                   "A mesh, a map (PNG, JPEG, EXR), a volume, a level set (.vdb), a scene, a built-in scene or a trace")
       ->required();
   command->add_flag("--implicit{256}", options->scene.implicit,
                     "Of a mesh: judge the potential made from it (--implicit=128, --implicit=0.4mm)");
   command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
+  command->add_option("--hand", options->scene.hand, "Hand to judge by: default, light, firm, paper");
+  command->add_option("--rate", options->scene.rate, "Force updates a second: 1kHz");
   command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
   command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
   command
@@ -444,8 +506,12 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
   command->add_option("--force", options->scene.force, "Of the hand: 1N");
   add_console_options(*command, console);
   command->footer(
+      "Of a relief: whether it can be felt as it is, criterion by criterion (docs/methods/renderability.md), the "
+      "nearest "
+      "changes with which it can, and which devices render it.\n"
       "Examples:\n"
       "  asperity inspect bunny.obj\n"
+      "  asperity inspect M_b-H_1 --device phantom-desktop --force 0.5N --speed 10mm/s\n"
       "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
       "  asperity inspect kitchen.vtk\n"
       "  asperity inspect out/icosphere-relief/trace.asptrace --json");

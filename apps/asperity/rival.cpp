@@ -75,6 +75,18 @@ Result<bool> change(Instance& instance, const std::string& word) {
     }));
     return true;
   }
+  if (stem == "unblended") {
+    if (instance.closed_from == nullptr) return false;
+    instance.surface = instance.closed_from->before;
+    instance.closed_from.reset();
+    return true;
+  }
+  if (stem == "neighbours") {
+    auto* law = std::get_if<MesostructureLaw>(&instance.law);
+    if (law == nullptr || law->formulation != Formulation::literal) return false;
+    law->test_neighbours = true;
+    return true;
+  }
   const Formulation as = formulation;
   if (stem == "texture") {
     return change_fine(instance, [as](FineSettings& fine) {
@@ -126,6 +138,8 @@ Result<bool> change(Instance& instance, const std::string& word) {
 
 const char* needed_by(const std::string& word) {
   const std::string stem = split(word).first;
+  if (stem == "unblended") return "a coat with \"closing\"";
+  if (stem == "neighbours") return "the law mesostructure-literal";
   return stem == "lay" ? "friction that depends on the direction" : "a texture";
 }
 
@@ -133,7 +147,8 @@ const char* needed_by(const std::string& word) {
 
 const std::vector<std::string>& fine_words() {
   static const std::vector<std::string> words = [] {
-    std::vector<std::string> all{"no-friction", "texture", "texture-literal", "no-texture", "lay", "lay-literal"};
+    std::vector<std::string> all{"no-friction", "texture",     "texture-literal", "no-texture",
+                                 "lay",         "lay-literal", "unblended",       "neighbours"};
     for (const std::string& name : friction_names()) {
       all.push_back(name);
       if (has_literal(name)) all.push_back(name + literal_suffix);
@@ -198,7 +213,7 @@ Result<Experiment> felt_by(const Experiment& experiment, const Rival& rival) {
     if (!any) return nothing_there(word, needed_by(word), experiment.name);
   }
   std::vector<FieldEffect> effects(felt.scene.effects().begin(), felt.scene.effects().end());
-  ASPERITY_TRY(felt.scene, Scene::build(std::move(instances), felt.scene.probe_radius(), std::move(effects)));
+  ASPERITY_TRY(felt.scene, Scene::build(std::move(instances), felt.scene.settings(), std::move(effects)));
   return felt;
 }
 
@@ -206,6 +221,8 @@ std::vector<std::string> default_rivals(const Scene& scene) {
   if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
   for (const Instance& instance : scene.instances()) {
     const std::string law = law_name(instance.law);
+    if (instance.closed_from != nullptr)
+      return {"mesostructure-literal+unblended", "mesostructure-literal+neighbours+unblended", law + "+unblended", law};
     if (instance.fine != nullptr && instance.fine->has_texture())
       return {law + "+texture", law + "+texture-literal", law + "+no-texture"};
     if (instance.fine != nullptr && instance.fine->shapes_friction()) return {law + "+lay", law + "+lay-literal"};
@@ -213,7 +230,8 @@ std::vector<std::string> default_rivals(const Scene& scene) {
       return {law + "+implicit-coulomb",  law + "+karnopp", law + "+karnopp-literal", law + "+dahl",
               law + "+hayward-armstrong", law + "+lugre",   law + "+coulomb"};
     }
-    if (parametric_of(instance.surface) != nullptr) return {"proxy"};
+    if (custom_of(instance.law) != nullptr) return {law, "proxy"};
+    if (parametric_of(instance.surface) != nullptr || custom_of(instance.surface) != nullptr) return {"proxy"};
     if (std::holds_alternative<MagneticLaw>(instance.law)) return {"magnetic", "magnetic-literal", "proxy"};
     if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
       if (implicit->mesh() == nullptr)
@@ -227,6 +245,19 @@ std::vector<std::string> default_rivals(const Scene& scene) {
     if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
   }
   return {"proxy", "mesostructure", "height-field", "force-shading"};
+}
+
+std::vector<std::string> suitable_rivals(const Experiment& experiment) {
+  std::vector<std::string> suitable;
+  for (const std::string& name : default_rivals(experiment.scene)) {
+    const Result<Rival> rival = parse_rival(name);
+    // What a law stands on is made later; what the scene itself refuses is known now.
+    if (!rival || (rival->kind.empty() && !felt_by(experiment, *rival))) continue;
+    suitable.push_back(name);
+  }
+  if (suitable.empty() && !experiment.scene.instances().empty())
+    suitable.push_back(law_name(experiment.scene.instances().front().law));
+  return suitable;
 }
 
 }  // namespace asperity::program

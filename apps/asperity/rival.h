@@ -18,7 +18,8 @@ struct Rival {
 };
 
 /// What may stand behind a law, each after a "+": a friction law, also with "-literal"; "no-friction", "texture",
-/// "texture-literal", "no-texture", "lay", "lay-literal". [any]
+/// "texture-literal", "no-texture", "lay", "lay-literal"; "unblended" for a closed relief as it was before,
+/// "neighbours" for the literal mesostructure law with a test of all prisms around. [any]
 const std::vector<std::string>& fine_words();
 /// Errors: bad_value, naming the word and what is accepted. [main]
 Result<Rival> parse_rival(const std::string& name);
@@ -27,5 +28,7 @@ Result<Rival> parse_rival(const std::string& name);
 Result<Experiment> felt_by(const Experiment& experiment, const Rival& rival);
 /// What is worth comparing on a scene. [main]
 std::vector<std::string> default_rivals(const Scene& scene);
+/// Of them those that the scene can be felt by; at least its own law. [main]
+std::vector<std::string> suitable_rivals(const Experiment& experiment);
 
 }  // namespace asperity::program

@@ -115,7 +115,15 @@ std::string parametric_fact(const ParametricSurface& surface) {
   return text;
 }
 
+std::string custom_fact(const CustomSurface& surface) {
+  const Vec3 extent = surface.bounds().extent();
+  return fmt::format("custom surface \"{}\", {} x {} x {}, {}", surface.type(), format_length(extent.x()),
+                     format_length(extent.y()), format_length(extent.z()),
+                     surface.has_folds() ? "may have edges" : "without edges");
+}
+
 std::string surface_fact(const Instance& instance) {
+  if (const CustomSurface* custom = custom_of(instance.surface)) return custom_fact(*custom);
   if (const ParametricSurface* parametric = parametric_of(instance.surface)) return parametric_fact(*parametric);
   if (const ImplicitSurface* implicit = implicit_of(instance.surface)) return implicit_fact(*implicit);
   if (const IsoSurface* iso = iso_of(instance.surface)) return volume_fact(*iso);

@@ -59,7 +59,7 @@ bool is_scene_file(const std::string& file) {
 
 bool is_picture_file(const std::string& file) {
   const std::string extension = lower_extension(file);
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg" || extension == ".exr";
 }
 
 std::string absolute(const std::string& path) {
@@ -194,7 +194,7 @@ void add_scene_options(CLI::App& command, SceneArgument& a) {
                   "A scene file, a mesh (OBJ, PLY, STL, glTF), a level set (.vdb), a volume (VTK, OpenFOAM, NRRD, raw, "
                   ".aspvol), or a built-in scene (asperity scenes)")
       ->capture_default_str();
-  command.add_option("--relief", a.relief, "Height map (PNG, JPEG) to lay on every surface")->group("Relief");
+  command.add_option("--relief", a.relief, "Height map (PNG, JPEG, EXR) to lay on every surface")->group("Relief");
   command.add_option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge")->group("Relief");
   command.add_option("--tile", a.tile, "Width of one repeat of the map, for meshes without texture coordinates: 20mm")
       ->group("Relief");

@@ -417,4 +417,14 @@ StrokeSettings default_stroke(const Box& bounds) {
   return settings;
 }
 
+StrokePath StrokePath::mapped(const std::function<Vec3(const Vec3&)>& place,
+                              const std::function<Vec3(const Vec3&)>& direction) const {
+  StrokePath out = *this;
+  for (Vec3& point : out.points_) point = place(point);
+  for (Vec3& normal : out.normals_) normal = direction(normal);
+  for (std::size_t i = 1; i < out.arcs_.size(); ++i)
+    out.arcs_[i] = out.arcs_[i - 1] + (out.points_[i] - out.points_[i - 1]).norm();
+  return out;
+}
+
 }  // namespace asperity

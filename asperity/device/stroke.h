@@ -117,6 +117,10 @@ class StrokePath {
   [[nodiscard]] std::span<const Vec3> points() const noexcept { return points_; }
   [[nodiscard]] std::span<const Vec3> normals() const noexcept { return normals_; }
   [[nodiscard]] std::span<const double> arcs() const noexcept { return arcs_; }
+  /// The same samples at other places, with their arc lengths measured anew; for asking about places, not for timing.
+  /// [build]
+  [[nodiscard]] StrokePath mapped(const std::function<Vec3(const Vec3&)>& place,
+                                  const std::function<Vec3(const Vec3&)>& direction) const;
 
  private:
   friend class StrokeBuilder;

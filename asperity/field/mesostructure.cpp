@@ -174,9 +174,56 @@ MesostructureSample Mesostructure::sample(const Vec2& st) const noexcept {
           normals_ ? normals_->sample(st) : normal_from_gradient(relief.gradient, tile_)};
 }
 
+HeightCurvature Mesostructure::curvature(const Vec2& st, double level) const noexcept {
+  if (level <= 0.0 || detail_ == nullptr) return heights_.curvature(st);
+  const double felt = std::min(level, static_cast<double>(detail_->levels()));
+  const int below = static_cast<int>(felt);
+  const double part = felt - below;
+  HeightCurvature mixed = below == 0 ? heights_.curvature(st) : detail_->map(below).curvature(st);
+  if (part <= 0.0) return mixed;
+  const HeightCurvature above = detail_->map(below + 1).curvature(st);
+  mixed.height += part * (above.height - mixed.height);
+  mixed.gradient += part * (above.gradient - mixed.gradient);
+  mixed.ss += part * (above.ss - mixed.ss);
+  mixed.st += part * (above.st - mixed.st);
+  mixed.tt += part * (above.tt - mixed.tt);
+  return mixed;
+}
+
+HeightRange Mesostructure::range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept {
+  if (level <= 0.0 || detail_ == nullptr) return heights_.range_over(lower, upper);
+  const double felt = std::min(level, static_cast<double>(detail_->levels()));
+  const int below = static_cast<int>(felt);
+  const double part = felt - below;
+  HeightRange mixed = below == 0 ? heights_.range_over(lower, upper) : detail_->map(below).range_over(lower, upper);
+  if (part <= 0.0) return mixed;
+  const HeightRange above = detail_->map(below + 1).range_over(lower, upper);
+  // Heights are mixed by another order of rounding than these bounds: a hair of room.
+  const double room =
+      1e-15 * (std::abs(mixed.lowest) + std::abs(mixed.highest) + std::abs(above.lowest) + std::abs(above.highest));
+  return {mixed.lowest + part * (above.lowest - mixed.lowest) - room,
+          mixed.highest + part * (above.highest - mixed.highest) + room};
+}
+
+Mesostructure Mesostructure::with_detail(std::shared_ptr<const DetailPyramid> detail) const {
+  Mesostructure copy = *this;
+  copy.detail_ = std::move(detail);
+  return copy;
+}
+
+HeightRange Mesostructure::range() const noexcept {
+  HeightRange all{heights_.lowest(), heights_.highest()};
+  for (int level = 1; detail_ != nullptr && level <= detail_->levels(); ++level) {
+    all.lowest = std::min(all.lowest, detail_->map(level).lowest());
+    all.highest = std::max(all.highest, detail_->map(level).highest());
+  }
+  return all;
+}
+
 std::size_t Mesostructure::memory_bytes() const noexcept {
   const std::size_t normals = normals_ ? normals_->memory_bytes() - sizeof(NormalMap) : 0;
-  return sizeof(*this) + heights_.memory_bytes() - sizeof(HeightMap) + normals;
+  const std::size_t detail = detail_ != nullptr ? detail_->memory_bytes() : 0;
+  return sizeof(*this) + heights_.memory_bytes() - sizeof(HeightMap) + normals + detail;
 }
 
 NormalAgreement compare_normals(const HeightMap& heights, const NormalMap& normals, const Vec2& tile) {

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
+#include "asperity/field/detail_pyramid.h"
 #include "asperity/field/height_map.h"
 #include "asperity/field/normal_map.h"
 
@@ -35,6 +37,17 @@ class Mesostructure {
 
   /// Height, gradient and normal at texture coordinates `st`. [servo]
   [[nodiscard]] MesostructureSample sample(const Vec2& st) const noexcept;
+  /// Height with its derivatives at a level of detail: 0 the map itself, between two levels mixed. Without a pyramid
+  /// every level is 0. [servo]
+  [[nodiscard]] HeightCurvature curvature(const Vec2& st, double level) const noexcept;
+  /// Bounds of that height over a rectangle, as HeightMap::range_over. [servo]
+  [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
+  /// The same mesostructure with levels of detail. [build]
+  [[nodiscard]] Mesostructure with_detail(std::shared_ptr<const DetailPyramid> detail) const;
+  /// Its levels of detail, or nullptr. [any]
+  [[nodiscard]] const DetailPyramid* detail() const noexcept { return detail_.get(); }
+  /// Bounds of every height at every level (m). [any]
+  [[nodiscard]] HeightRange range() const noexcept;
 
   [[nodiscard]] const HeightMap& heights() const noexcept { return heights_; }
   [[nodiscard]] bool has_normal_map() const noexcept { return normals_.has_value(); }
@@ -49,6 +62,7 @@ class Mesostructure {
 
   HeightMap heights_;
   std::optional<NormalMap> normals_;
+  std::shared_ptr<const DetailPyramid> detail_;
   Vec2 tile_ = Vec2::Ones();
 };
 

@@ -67,12 +67,11 @@ class Bvh::Builder {
       all.box.include(primitives_[face]);
     }
     bvh_.leaves_.reserve(count / 5 + 1);
-    bvh_.cylinders_.reserve(count / 5 + 1);
     bvh_.nodes_.reserve(count / 24 + 1);
     build_node(all, 0);
     bvh_.nodes_.shrink_to_fit();
     bvh_.leaves_.shrink_to_fit();
-    bvh_.cylinders_.shrink_to_fit();
+    bvh_.cylinders_.resize(bvh_.leaves_.size());
   }
 
  private:
@@ -105,7 +104,7 @@ class Bvh::Builder {
     }
     const auto index = static_cast<std::uint32_t>(bvh_.nodes_.size());
     bvh_.nodes_.emplace_back();
-    set_boxes(bvh_.nodes_[index], children, count);
+    for (std::uint32_t& child : bvh_.nodes_[index].child) child = empty_child;
     for (int i = 0; i < count; ++i) {
       const std::uint32_t child =
           children[i].size() <= leaf_size ? build_leaf(children[i]) : build_node(children[i], depth + 1);
@@ -114,66 +113,11 @@ class Bvh::Builder {
     return index;
   }
 
-  static void set_boxes(Node& node, const Range (&children)[8], int count) {
-    for (int i = 0; i < 8; ++i) {
-      node.child[i] = empty_child;
-      for (int axis = 0; axis < 3; ++axis) {
-        node.boxes.lower[axis][i] = i < count ? children[i].box.lower[axis] : 1e30F;
-        node.boxes.upper[axis][i] = i < count ? children[i].box.upper[axis] : -1e30F;
-      }
-    }
-  }
-
   std::uint32_t build_leaf(const Range& range) {
-    Leaf leaf;
-    for (std::uint32_t i = 0; i < 8; ++i) {
-      const bool used = i < range.size();
-      leaf.face[i] = used ? primitives_[range.first + i].face : no_index;
-      for (int axis = 0; axis < 3; ++axis) {
-        leaf.triangles.corner[axis][i] = 1e9F;
-        leaf.triangles.edge1[axis][i] = 0.0F;
-        leaf.triangles.edge2[axis][i] = 0.0F;
-      }
-      if (!used) continue;
-      const auto corners = mesh_.corners(leaf.face[i]);
-      for (int axis = 0; axis < 3; ++axis) {
-        leaf.triangles.corner[axis][i] = static_cast<float>((corners[0][axis] - bvh_.origin_[axis]) * bvh_.per_scale_);
-        leaf.triangles.edge1[axis][i] = static_cast<float>((corners[1][axis] - corners[0][axis]) * bvh_.per_scale_);
-        leaf.triangles.edge2[axis][i] = static_cast<float>((corners[2][axis] - corners[0][axis]) * bvh_.per_scale_);
-      }
-    }
-    bvh_.leaves_.push_back(leaf);
-    bvh_.cylinders_.push_back(around(range));
+    Leaf& leaf = bvh_.leaves_.emplace_back();
+    for (std::uint32_t i = 0; i < 8; ++i)
+      leaf.face[i] = i < range.size() ? primitives_[range.first + i].face : no_index;
     return static_cast<std::uint32_t>(bvh_.leaves_.size() - 1) | leaf_bit;
-  }
-
-  /// The cylinder around a leaf: its axis is the mean normal, by area.
-  [[nodiscard]] Cylinder around(const Range& range) const {
-    Vec3 normal = Vec3::Zero();
-    Box box;
-    for (std::uint32_t i = range.first; i < range.last; ++i) {
-      const auto [a, b, c] = mesh_.corners(primitives_[i].face);
-      normal += (b - a).cross(c - a);
-      for (const Vec3& corner : {a, b, c}) box.include(corner);
-    }
-    const Vec3 axis = normal.norm() > 0.0 ? Vec3(normal.normalized()) : Vec3(Vec3::UnitZ());
-    const Vec3 centre = box.centre();
-    double radius = 0.0;
-    double half_height = 0.0;
-    for (std::uint32_t i = range.first; i < range.last; ++i) {
-      for (const Vec3& corner : mesh_.corners(primitives_[i].face)) {
-        const double along = axis.dot(corner - centre);
-        half_height = std::max(half_height, std::abs(along));
-        radius = std::max(radius, (corner - centre - along * axis).norm());
-      }
-    }
-    Cylinder cylinder;
-    bvh_.to_local(centre, cylinder.centre);
-    for (int k = 0; k < 3; ++k) cylinder.axis[k] = static_cast<float>(axis[k]);
-    // Room for the rounding of centre and axis.
-    cylinder.radius = static_cast<float>(radius * bvh_.per_scale_) * 1.00001F + 1e-6F;
-    cylinder.half_height = static_cast<float>(half_height * bvh_.per_scale_) * 1.00001F + 1e-6F;
-    return cylinder;
   }
 
   /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
@@ -259,13 +203,19 @@ class Bvh::Builder {
 
 Bvh Bvh::build(const TriangleMesh& mesh, const BvhSettings& settings) {
   Bvh bvh;
-  bvh.mesh_ = &mesh;
   bvh.kernels_ = settings.plain_kernels ? &plain_kernels() : &best_kernels();
-  bvh.origin_ = mesh.bounds().centre();
-  bvh.scale_ = std::max(0.5 * mesh.bounds().diagonal(), std::numeric_limits<double>::min());
-  bvh.per_scale_ = 1.0 / bvh.scale_;
+  bvh.frame(mesh);
   Builder(mesh, bvh).run();
+  BvhFitting fitting = bvh.fitting();
+  bvh.refit(mesh, fitting);
   return bvh;
+}
+
+void Bvh::frame(const TriangleMesh& mesh) noexcept {
+  mesh_ = &mesh;
+  origin_ = mesh.bounds().centre();
+  scale_ = std::max(0.5 * mesh.bounds().diagonal(), std::numeric_limits<double>::min());
+  per_scale_ = 1.0 / scale_;
 }
 
 ClosestHit Bvh::closest_from_afar(const Vec3& p, double bound) const noexcept {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "asperity/geometry/closest_point.h"
@@ -17,6 +19,23 @@ struct BvhSettings {
   bool plain_kernels = false;  ///< plain C++ in place of AVX2: the oracle
 };
 
+/// Takes a pair of triangles.
+using MeetingVisit = std::function<void(std::uint32_t, std::uint32_t)>;
+
+/// Where refitting finds the corners of each leaf's triangles in a row, and room for what it measures. [build]
+struct BvhFitting {
+  struct Corners {
+    std::uint32_t vertex[3][8];  ///< unused places repeat the first triangle
+    std::uint32_t used;
+  };
+  struct Bounds {
+    float lower[3];
+    float upper[3];
+  };
+  std::vector<Corners> leaves;
+  std::vector<Bounds> bounds;
+};
+
 /// Bounding-volume hierarchy, eight wide, binned by surface area (Wald 2007); leaves hold up to eight triangles in
 /// single precision relative to the object's centre and size. Single precision only discards, with a bound on its
 /// rounding; every answer is decided in double precision on the mesh's own vertices, so it equals brute force. Queries
@@ -25,6 +44,14 @@ class Bvh {
  public:
   /// About 0.5 s for 1.3 M triangles. [build]
   static Bvh build(const TriangleMesh& mesh, const BvhSettings& settings = {});
+  /// Fits boxes and leaves to another mesh of the same triangles; which triangles share a leaf stays. Every answer is
+  /// the mesh's, as after building; only the time it takes may grow (see cost()). [build]
+  void refit(const TriangleMesh& mesh, BvhFitting& fitting) noexcept;
+  /// What refitting needs beside the hierarchy, for it and all its copies. [build]
+  [[nodiscard]] BvhFitting fitting() const;
+  /// Boxes that a random line through the root's box meets, on average (surface area heuristic): what a search costs.
+  /// [any]
+  [[nodiscard]] double cost() const noexcept { return cost_; }
 
   /// Nearest triangle within `bound` (m) of `p`; face == no_index when there is none. [servo]
   [[nodiscard]] ClosestHit closest(const Vec3& p, double bound) const noexcept;
@@ -49,6 +76,9 @@ class Bvh {
     return static_cast<double>(rounding(local)) * scale_;
   }
 
+  /// Calls visit(one, other) once for every pair of triangles whose boxes, one for each triangle and around it, meet,
+  /// and perhaps for some that miss each other by a rounding. [build]
+  void for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const;
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const;
@@ -87,7 +117,12 @@ class Bvh {
     std::uint32_t child;
   };
   class Builder;
+  class Fitter;
+  class Join;
 
+  /// Sets the mesh, and the origin and unit of single precision.
+  void frame(const TriangleMesh& mesh) noexcept;
+  void fit_avx2(BvhFitting& fitting) noexcept;
   void to_local(const Vec3& p, float local[3]) const noexcept;
   [[nodiscard]] ClosestHit closest_from_afar(const Vec3& p, double bound) const noexcept;
   static bool reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept;
@@ -101,7 +136,8 @@ class Bvh {
   Vec3 origin_ = Vec3::Zero();
   double scale_ = 1.0;
   double per_scale_ = 1.0;  ///< 1 / scale_
-  std::vector<Node> nodes_;
+  double cost_ = 0.0;
+  std::vector<Node> nodes_;  ///< each before its children
   std::vector<Leaf> leaves_;
   std::vector<Cylinder> cylinders_;  ///< one around each leaf
 };

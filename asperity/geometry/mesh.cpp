@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
 
+#include "asperity/geometry/face_measures.h"
 #include "asperity/geometry/index_table.h"
 
 namespace asperity {
@@ -198,16 +198,48 @@ std::size_t count_components(std::size_t vertices, const std::vector<Triangle>& 
   return components;
 }
 
+void list_faces_of_vertices(std::size_t vertices, const std::vector<Triangle>& triangles,
+                            std::vector<std::uint32_t>& offsets, std::vector<std::uint32_t>& faces) {
+  offsets.assign(vertices + 1, 0);
+  for (const Triangle& t : triangles) {
+    for (const std::uint32_t corner : t) ++offsets[corner + 1];
+  }
+  for (std::size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
+  faces.resize(3 * triangles.size());
+  // Filling moves each start to the next vertex's start; shifting them back afterwards saves a second array.
+  for (std::uint32_t face = 0; face < triangles.size(); ++face) {
+    for (const std::uint32_t corner : triangles[face]) faces[offsets[corner]++] = face;
+  }
+  for (std::size_t i = vertices; i > 0; --i) offsets[i] = offsets[i - 1];
+  offsets[0] = 0;
+}
+
+void flip_all(std::vector<Triangle>& triangles, std::vector<std::array<Vec2f, 3>>& corner_uvs) {
+  for (Triangle& t : triangles) std::swap(t[1], t[2]);
+  for (auto& uvs : corner_uvs) std::swap(uvs[1], uvs[2]);
+}
+
+void add_notes(const MeshReport& report, std::size_t unused_vertices, std::vector<std::string>& notes) {
+  const auto note = [&](std::size_t count, const char* text) {
+    if (count > 0) notes.push_back(fmt::format("{} {}", count, text));
+  };
+  note(report.welded_vertices, "vertices merged with another at the same position");
+  note(report.dropped_degenerate, "triangles without area left out");
+  note(report.dropped_duplicate, "triangles with the same corners as an earlier one left out");
+  note(unused_vertices, "vertices that no triangle uses left out");
+}
+
+}  // namespace
+
 /// Walks the edges vertex by vertex: the edges at one vertex are few and lie together in memory, so that sorting them
 /// there is several times faster than one sort over all edges.
-class EdgeSurvey {
+class TriangleMesh::EdgeSurvey {
  public:
-  EdgeSurvey(const TriangleMesh& mesh, MeshReport& report) : mesh_(mesh), report_(report) {}
+  EdgeSurvey(const TriangleMesh& mesh, MeshReport& report, std::vector<OddEdge>& odd)
+      : mesh_(mesh), report_(report), odd_(odd) {}
 
   void run() {
-    report_.min_edge = infinity;
     for (std::uint32_t vertex = 0; vertex < mesh_.positions().size(); ++vertex) survey(vertex);
-    report_.mean_edge = edges_ == 0 ? 0.0 : length_sum_ / static_cast<double>(edges_);
   }
 
  private:
@@ -243,11 +275,7 @@ class EdgeSurvey {
   }
 
   void count_edge(std::uint32_t vertex, std::size_t first, std::size_t last) {
-    const double length = (mesh_.positions()[vertex] - mesh_.positions()[uses_[first].other]).norm();
-    ++edges_;
-    length_sum_ += length;
-    report_.min_edge = std::min(report_.min_edge, length);
-    report_.max_edge = std::max(report_.max_edge, length);
+    if (last - first != 2) odd_.push_back({vertex, uses_[first].other, static_cast<std::uint32_t>(last - first)});
     if (last - first == 1) ++report_.boundary_edges;
     if (last - first > 2) ++report_.nonmanifold_edges;
     const bool same_way = (uses_[first].fan_and_direction & 1U) == (uses_[last - 1].fan_and_direction & 1U);
@@ -256,88 +284,10 @@ class EdgeSurvey {
 
   const TriangleMesh& mesh_;
   MeshReport& report_;
+  std::vector<OddEdge>& odd_;
   std::vector<Use> uses_;
   std::vector<std::uint32_t> parents_;
-  std::size_t edges_ = 0;
-  double length_sum_ = 0.0;
 };
-
-/// Area, volume and the worst aspect ratio. The volume is summed about `centre`, which costs a mesh far from the
-/// origin no digits.
-void measure_triangles(const TriangleMesh& mesh, const Vec3& centre, MeshReport& report) {
-  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
-    const auto [a, b, c] = mesh.corners(face);
-    const Vec3 cross = (b - a).cross(c - a);
-    const double doubled_area = cross.norm();
-    const double longest = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
-    report.area += 0.5 * doubled_area;
-    report.signed_volume += cross.dot(a - centre) / 6.0;
-    report.worst_aspect = std::max(report.worst_aspect, longest / doubled_area);
-  }
-}
-
-/// Interior angles of a triangle (rad). By atan2, which stays accurate for slivers where the cosine does not.
-Vec3 corner_angles(const Vec3& ab, const Vec3& ac, double doubled_area) {
-  const double at_a = std::atan2(doubled_area, ab.dot(ac));
-  const double at_b = std::atan2(doubled_area, ab.dot(ab - ac));
-  return {at_a, at_b, std::max(0.0, std::numbers::pi - at_a - at_b)};
-}
-
-std::vector<Vec3f> angle_weighted_normals(const TriangleMesh& mesh) {
-  std::vector<Vec3> sums(mesh.positions().size(), Vec3::Zero());
-  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
-    const auto [a, b, c] = mesh.corners(face);
-    const Vec3 cross = (b - a).cross(c - a);
-    const double doubled_area = cross.norm();
-    const Vec3 angles = corner_angles(b - a, c - a, doubled_area);
-    const Vec3 normal = cross / doubled_area;
-    const Triangle& t = mesh.triangles()[face];
-    sums[t[0]] += angles[0] * normal;
-    sums[t[1]] += angles[1] * normal;
-    sums[t[2]] += angles[2] * normal;
-  }
-  std::vector<Vec3f> normals(sums.size());
-  for (std::uint32_t vertex = 0; vertex < sums.size(); ++vertex) {
-    const double length = sums[vertex].norm();
-    // Triangles that face each other can cancel: any one of their normals is then as good as another.
-    const Vec3 unit = length > 1e-9 ? Vec3(sums[vertex] / length) : mesh.face_normal(mesh.faces_of_vertex(vertex)[0]);
-    normals[vertex] = unit.cast<float>();
-  }
-  return normals;
-}
-
-void list_faces_of_vertices(std::size_t vertices, const std::vector<Triangle>& triangles,
-                            std::vector<std::uint32_t>& offsets, std::vector<std::uint32_t>& faces) {
-  offsets.assign(vertices + 1, 0);
-  for (const Triangle& t : triangles) {
-    for (const std::uint32_t corner : t) ++offsets[corner + 1];
-  }
-  for (std::size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
-  faces.resize(3 * triangles.size());
-  // Filling moves each start to the next vertex's start; shifting them back afterwards saves a second array.
-  for (std::uint32_t face = 0; face < triangles.size(); ++face) {
-    for (const std::uint32_t corner : triangles[face]) faces[offsets[corner]++] = face;
-  }
-  for (std::size_t i = vertices; i > 0; --i) offsets[i] = offsets[i - 1];
-  offsets[0] = 0;
-}
-
-void flip_all(std::vector<Triangle>& triangles, std::vector<std::array<Vec2f, 3>>& corner_uvs) {
-  for (Triangle& t : triangles) std::swap(t[1], t[2]);
-  for (auto& uvs : corner_uvs) std::swap(uvs[1], uvs[2]);
-}
-
-void add_notes(const MeshReport& report, std::size_t unused_vertices, std::vector<std::string>& notes) {
-  const auto note = [&](std::size_t count, const char* text) {
-    if (count > 0) notes.push_back(fmt::format("{} {}", count, text));
-  };
-  note(report.welded_vertices, "vertices merged with another at the same position");
-  note(report.dropped_degenerate, "triangles without area left out");
-  note(report.dropped_duplicate, "triangles with the same corners as an earlier one left out");
-  note(unused_vertices, "vertices that no triangle uses left out");
-}
-
-}  // namespace
 
 Result<TriangleMesh> TriangleMesh::build(MeshSource source, const MeshBuildSettings& settings) {
   ASPERITY_CHECK(check_source(source, settings));
@@ -355,36 +305,108 @@ Result<TriangleMesh> TriangleMesh::build(MeshSource source, const MeshBuildSetti
                     "at least one triangle whose corners are not in one line");
   }
   const std::size_t unused_vertices = drop_unused_vertices(source);
-  mesh.notes_ = std::move(source.notes);
-  add_notes(report, unused_vertices, mesh.notes_);
-  mesh.take(std::move(source));
-  mesh.derive(settings.orient_outward);
+  add_notes(report, unused_vertices, source.notes);
+  mesh.derive(std::move(source), settings.orient_outward);
   return mesh;
 }
 
-void TriangleMesh::take(MeshSource source) {
+void TriangleMesh::derive(MeshSource source, bool orient_outward) {
   positions_ = std::move(source.positions);
-  triangles_ = std::move(source.triangles);
-  corner_uvs_ = std::move(source.corner_uvs);
   positions_.shrink_to_fit();
-  triangles_.shrink_to_fit();
-  corner_uvs_.shrink_to_fit();
-}
+  const auto topology = std::make_shared<Topology>();
+  topology->triangles = std::move(source.triangles);
+  topology->corner_uvs = std::move(source.corner_uvs);
+  topology->notes = std::move(source.notes);
+  topology->triangles.shrink_to_fit();
+  topology->corner_uvs.shrink_to_fit();
+  list_faces_of_vertices(positions_.size(), topology->triangles, topology->vertex_offsets, topology->vertex_faces);
+  topology_ = topology;
+  triangles_ = topology->triangles;
+  corner_uvs_ = topology->corner_uvs.empty() ? nullptr : topology->corner_uvs.data();
+  vertex_offsets_ = topology->vertex_offsets.data();
+  vertex_faces_ = topology->vertex_faces.data();
 
-void TriangleMesh::derive(bool orient_outward) {
   report_.vertices = positions_.size();
   report_.triangles = triangles_.size();
   for (const Vec3& position : positions_) bounds_.include(position);
-  list_faces_of_vertices(positions_.size(), triangles_, vertex_offsets_, vertex_faces_);
-  EdgeSurvey(*this, report_).run();
-  report_.components = count_components(positions_.size(), triangles_);
-  measure_triangles(*this, bounds_.centre(), report_);
+  EdgeSurvey(*this, report_, topology->odd_edges).run();
+  topology->odd_edges.shrink_to_fit();
+  report_.components = count_components(positions_.size(), topology->triangles);
+  std::vector<Vec3> sums;
+  static_cast<void>(measure_faces(sums));
   if (orient_outward && report_.closed() && report_.oriented() && report_.signed_volume < 0.0) {
-    flip_all(triangles_, corner_uvs_);
-    report_.signed_volume = -report_.signed_volume;
-    notes_.emplace_back("normals pointed inward: all triangles were flipped");
+    flip_all(topology->triangles, topology->corner_uvs);
+    static_cast<void>(measure_faces(sums));
+    topology->notes.emplace_back("normals pointed inward: all triangles were flipped");
   }
-  vertex_normals_ = angle_weighted_normals(*this);
+}
+
+/// Answers whether some triangle may have lost its area.
+bool TriangleMesh::measure_faces(std::vector<Vec3>& sums) {
+  const FaceMeasures measures =
+      asperity::measure_faces(positions_, triangles_, bounds_.centre(), sums, vertex_normals_);
+  report_.area = measures.area;
+  report_.signed_volume = measures.signed_volume;
+  report_.worst_aspect = measures.worst_aspect;
+  report_.min_edge = measures.min_edge;
+  report_.max_edge = measures.max_edge;
+  // Every triangle has counted its edges; an edge of two triangles is one.
+  double doubled_sum = measures.edge_sum;
+  double doubled_edges = 3.0 * static_cast<double>(triangles_.size());
+  for (const OddEdge& edge : topology_->odd_edges) {
+    const double missing = 2.0 - static_cast<double>(edge.triangles);
+    doubled_sum += missing * (positions_[edge.from] - positions_[edge.to]).norm();
+    doubled_edges += missing;
+  }
+  report_.mean_edge = doubled_sum / doubled_edges;
+  for (std::uint32_t vertex = 0; vertex < vertex_normals_.size(); ++vertex) {
+    // Where the triangles around cancel, any one of their normals is as good as another.
+    if (vertex_normals_[vertex].x() == 0.0F && vertex_normals_[vertex].isZero(0.0F))
+      vertex_normals_[vertex] = face_normal(faces_of_vertex(vertex)[0]).cast<float>();
+  }
+  return measures.suspect;
+}
+
+Status TriangleMesh::place(std::span<const Vec3> positions) {
+  if (positions.size() != positions_.size()) {
+    return Error{ErrorCode::mismatch,
+                 fmt::format("has {} positions", positions.size()),
+                 {},
+                 "moved mesh",
+                 fmt::format("{}, one for every vertex of the mesh", positions_.size())};
+  }
+  Vec3 lower = Vec3::Constant(infinity);
+  Vec3 upper = Vec3::Constant(-infinity);
+  bool in_range = true;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const Vec3 at = positions[i].array() + 0.0;
+    positions_[i] = at;
+    lower = lower.cwiseMin(at);
+    upper = upper.cwiseMax(at);
+    in_range = in_range && std::abs(at.x()) <= largest_coordinate && std::abs(at.y()) <= largest_coordinate &&
+               std::abs(at.z()) <= largest_coordinate;
+  }
+  bounds_ = {lower, upper};
+  return in_range ? success() : scale_positions(positions_, 1.0);
+}
+
+Status TriangleMesh::measure(std::vector<Vec3>& sums) {
+  if (!measure_faces(sums)) return success();
+  for (std::uint32_t face = 0; face < triangles_.size(); ++face) {
+    const auto [a, b, c] = corners(face);
+    if (!degenerate(a, b, c)) continue;
+    return bad_mesh("has lost its area", fmt::format("triangle {} (counted from 0)", face),
+                    "positions that leave every triangle an area");
+  }
+  return success();
+}
+
+Result<TriangleMesh> TriangleMesh::moved(std::span<const Vec3> positions) const {
+  TriangleMesh mesh = *this;
+  ASPERITY_CHECK(mesh.place(positions));
+  std::vector<Vec3> sums;
+  ASPERITY_CHECK(mesh.measure(sums));
+  return mesh;
 }
 
 Vec3 TriangleMesh::face_normal(std::uint32_t face) const noexcept {
@@ -414,13 +436,16 @@ std::size_t TriangleMesh::memory_bytes() const noexcept {
   std::size_t bytes = sizeof(*this);
   const auto add = [&](const auto& values) { bytes += values.capacity() * sizeof(values[0]); };
   add(positions_);
-  add(triangles_);
-  add(corner_uvs_);
   add(vertex_normals_);
-  add(vertex_offsets_);
-  add(vertex_faces_);
-  add(notes_);
-  for (const std::string& note : notes_) bytes += note.capacity();
+  if (topology_ == nullptr) return bytes;
+  bytes += sizeof(Topology);
+  add(topology_->triangles);
+  add(topology_->corner_uvs);
+  add(topology_->vertex_offsets);
+  add(topology_->vertex_faces);
+  add(topology_->odd_edges);
+  add(topology_->notes);
+  for (const std::string& note : topology_->notes) bytes += note.capacity();
   return bytes;
 }
 

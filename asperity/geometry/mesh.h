@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -58,10 +59,14 @@ class TriangleMesh {
   /// Welds, cleans and validates. Errors: bad_mesh (no triangle with area, index out of range, position not finite,
   /// more than 1.4e9 triangles), each naming the vertex or triangle. [build]
   static Result<TriangleMesh> build(MeshSource source, const MeshBuildSettings& settings = {});
+  /// The same triangles with vertices elsewhere (m, as many as positions()); shares what does not change. Everything
+  /// measured (normals, bounds, lengths, areas) is measured anew; orientation stays as it is. Errors: mismatch (count),
+  /// bad_mesh (not finite, naming the vertex; a triangle that lost its area, naming it). [build]
+  [[nodiscard]] Result<TriangleMesh> moved(std::span<const Vec3> positions) const;
 
   [[nodiscard]] std::span<const Vec3> positions() const noexcept { return positions_; }
   [[nodiscard]] std::span<const Triangle> triangles() const noexcept { return triangles_; }
-  [[nodiscard]] bool has_uvs() const noexcept { return !corner_uvs_.empty(); }
+  [[nodiscard]] bool has_uvs() const noexcept { return corner_uvs_ != nullptr; }
   /// Corner UVs of triangle `face`; only when has_uvs().
   [[nodiscard]] const std::array<Vec2f, 3>& uvs(std::uint32_t face) const noexcept { return corner_uvs_[face]; }
   [[nodiscard]] std::array<Vec3, 3> corners(std::uint32_t face) const noexcept {
@@ -76,7 +81,7 @@ class TriangleMesh {
   }
   /// Triangles that have `vertex` as a corner, ascending. [servo]
   [[nodiscard]] std::span<const std::uint32_t> faces_of_vertex(std::uint32_t vertex) const noexcept {
-    return {vertex_faces_.data() + vertex_offsets_[vertex], vertex_faces_.data() + vertex_offsets_[vertex + 1]};
+    return {vertex_faces_ + vertex_offsets_[vertex], vertex_faces_ + vertex_offsets_[vertex + 1]};
   }
   /// The triangle across edge `edge` of `face` (edge i runs from corner i to corner (i+1)%3), or no_index at a
   /// boundary or where three or more triangles meet. [servo]
@@ -85,25 +90,50 @@ class TriangleMesh {
   [[nodiscard]] const MeshReport& report() const noexcept { return report_; }
   [[nodiscard]] const Box& bounds() const noexcept { return bounds_; }
   [[nodiscard]] double mean_edge() const noexcept { return report_.mean_edge; }
-  /// Bytes held by this object, its arrays included.
+  /// Whether the two have the same triangles in common: one is the other, its copy or moved. [any]
+  [[nodiscard]] bool same_topology(const TriangleMesh& other) const noexcept { return topology_ == other.topology_; }
+  /// Bytes held by this object, its arrays included; what it shares with moved ones too.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
   /// What the reader or the builder changed, for `inspect`.
-  [[nodiscard]] std::span<const std::string> notes() const noexcept { return notes_; }
+  [[nodiscard]] std::span<const std::string> notes() const noexcept { return topology_->notes; }
 
  private:
+  friend class MeshRefitter;
+
+  /// An edge that has another number of triangles than two.
+  struct OddEdge {
+    std::uint32_t from;
+    std::uint32_t to;
+    std::uint32_t triangles;
+  };
+  /// What stays when vertices move.
+  struct Topology {
+    std::vector<Triangle> triangles;
+    std::vector<std::array<Vec2f, 3>> corner_uvs;
+    std::vector<std::uint32_t> vertex_offsets;
+    std::vector<std::uint32_t> vertex_faces;
+    std::vector<OddEdge> odd_edges;
+    std::vector<std::string> notes;
+  };
+  class EdgeSurvey;
+
   TriangleMesh() = default;
-  void take(MeshSource source);
-  void derive(bool orient_outward);
+  void derive(MeshSource source, bool orient_outward);
+  /// Takes the positions over, in two parts so that a search structure can be refitted beside the second.
+  Status place(std::span<const Vec3> positions);
+  Status measure(std::vector<Vec3>& sums);
+  [[nodiscard]] bool measure_faces(std::vector<Vec3>& sums);
 
   std::vector<Vec3> positions_;
-  std::vector<Triangle> triangles_;
-  std::vector<std::array<Vec2f, 3>> corner_uvs_;
   std::vector<Vec3f> vertex_normals_;
-  std::vector<std::uint32_t> vertex_offsets_;
-  std::vector<std::uint32_t> vertex_faces_;
   Box bounds_;
   MeshReport report_;
-  std::vector<std::string> notes_;
+  std::shared_ptr<const Topology> topology_;
+  // Into topology_, so that a query need not go through it.
+  std::span<const Triangle> triangles_;
+  const std::array<Vec2f, 3>* corner_uvs_ = nullptr;
+  const std::uint32_t* vertex_offsets_ = nullptr;
+  const std::uint32_t* vertex_faces_ = nullptr;
 };
 
 /// Whether two triangles have a corner in common. [servo]

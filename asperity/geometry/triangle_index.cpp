@@ -46,42 +46,51 @@ void along(const TriangleOctree& octree, const Segment& motion, double radius, V
 
 }  // namespace
 
+TriangleIndex::TriangleIndex(std::shared_ptr<const Inside> inside, std::uint64_t lineage)
+    : inside_(std::move(inside)), identity_(next_identity()), lineage_(lineage) {
+  if (lineage_ == 0) lineage_ = identity_;
+  tolerance_ = ContactTolerance::of(mesh().mean_edge(), mesh().bounds());
+}
+
 TriangleIndex TriangleIndex::build(TriangleMesh mesh, SearchStructure structure, const BvhSettings& settings) {
-  TriangleIndex index;
-  index.mesh_ = std::make_unique<const TriangleMesh>(std::move(mesh));
-  index.identity_ = next_identity();
-  index.tolerance_ = ContactTolerance::of(index.mesh_->mean_edge(), index.mesh_->bounds());
+  const auto inside = std::make_shared<Inside>(std::move(mesh));
   if (structure == SearchStructure::bvh) {
-    index.structure_ = std::make_unique<const std::variant<Bvh, TriangleOctree>>(Bvh::build(*index.mesh_, settings));
+    inside->built_cost = inside->structure.emplace<Bvh>(Bvh::build(inside->mesh, settings)).cost();
   } else {
-    index.structure_ = std::make_unique<const std::variant<Bvh, TriangleOctree>>(TriangleOctree::build(*index.mesh_));
+    inside->structure.emplace<TriangleOctree>(TriangleOctree::build(inside->mesh));
   }
-  return index;
+  return {inside, 0};
+}
+
+double TriangleIndex::cost_ratio() const noexcept {
+  const Bvh* bvh = std::get_if<Bvh>(&inside_->structure);
+  return bvh != nullptr ? bvh->cost() / inside_->built_cost : 1.0;
 }
 
 std::size_t TriangleIndex::memory_bytes() const noexcept {
-  return mesh_->memory_bytes() +
-         std::visit([](const auto& structure) { return structure.memory_bytes(); }, *structure_);
+  return mesh().memory_bytes() +
+         std::visit([](const auto& structure) { return structure.memory_bytes(); }, inside_->structure);
 }
 
 FirstHit TriangleIndex::first_hit(const Segment& segment) const noexcept {
-  return std::visit([&](const auto& structure) { return structure.first_hit(segment); }, *structure_);
+  return std::visit([&](const auto& structure) { return structure.first_hit(segment); }, inside_->structure);
 }
 
 Foot TriangleIndex::closest(const Vec3& p, double bound) const noexcept {
-  const ClosestHit hit = std::visit([&](const auto& structure) { return structure.closest(p, bound); }, *structure_);
+  const ClosestHit hit =
+      std::visit([&](const auto& structure) { return structure.closest(p, bound); }, inside_->structure);
   return hit.face == no_index ? Foot{}
-                              : triangle_foot(hit.face, hit.point, p, mesh_->face_normal(hit.face), tolerance_);
+                              : triangle_foot(hit.face, hit.point, p, mesh().face_normal(hit.face), tolerance_);
 }
 
 Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept {
-  const Bvh* bvh = std::get_if<Bvh>(structure_.get());
+  const Bvh* bvh = std::get_if<Bvh>(&inside_->structure);
   if (patch.owner != identity_) patch.last_face = no_index;
   TrianglePoint best;
   std::uint32_t best_face = no_index;
   double reach = bound;
   const auto offer = [&](std::uint32_t face) {
-    const auto [a, b, c] = mesh_->corners(face);
+    const auto [a, b, c] = mesh().corners(face);
     const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
     if (point.squared_distance >= best.squared_distance || point.squared_distance > reach * reach) return;
     best = point;
@@ -95,28 +104,30 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
       if (distance <= reach + error && face != patch.last_face) offer(face);
     });
   } else {
-    const ClosestHit hit = std::visit([&](const auto& structure) { return structure.closest(p, reach); }, *structure_);
+    const ClosestHit hit =
+        std::visit([&](const auto& structure) { return structure.closest(p, reach); }, inside_->structure);
     if (hit.face != no_index && hit.point.squared_distance < best.squared_distance) {
       best = hit.point;
       best_face = hit.face;
     }
     if (best_face != no_index)
-      gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh_->mean_edge(), patch);
+      gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh().mean_edge(), patch);
   }
   if (best_face == no_index) return {};
   patch.last_face = best_face;
-  return triangle_foot(best_face, best, p, mesh_->face_normal(best_face), tolerance_);
+  return triangle_foot(best_face, best, p, mesh().face_normal(best_face), tolerance_);
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
-  std::visit([&](const auto& structure) { gather_from(structure, centre, reach, identity_, patch); }, *structure_);
+  std::visit([&](const auto& structure) { gather_from(structure, centre, reach, identity_, patch); },
+             inside_->structure);
 }
 
 bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept {
   if (patch.covers(identity_, position, reach)) return true;
   patch.rested = false;
   // Where a patch filled nearby was too small, more triangles lie within reach than it can hold: do not try again.
-  const double edge = mesh_->mean_edge();
+  const double edge = mesh().mean_edge();
   if (patch.owner == identity_ && patch.certified < reach && (position - patch.centre).norm() < edge) return false;
   gather(position, reach + patch_slack_in_edges * edge, patch);
   return patch.covers(identity_, position, reach);
@@ -124,13 +135,13 @@ bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& pa
 
 void TriangleIndex::sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides,
                                SweptHit& best) const noexcept {
-  const auto [a, b, c] = mesh_->corners(face);
+  const auto [a, b, c] = mesh().corners(face);
   sweep_triangle(face, a, b, c, motion, radius, sides, tolerance_, best);
 }
 
 template <class Visit>
 void TriangleIndex::scan_ball(const Vec3& position, double reach, TrianglePatch& patch, Visit&& visit) const noexcept {
-  if (const Bvh* bvh = std::get_if<Bvh>(structure_.get())) {
+  if (const Bvh* bvh = std::get_if<Bvh>(&inside_->structure)) {
     if (ensure(position, reach, patch)) {
       bvh->scan(patch, position, reach, visit);
     } else {
@@ -140,15 +151,15 @@ void TriangleIndex::scan_ball(const Vec3& position, double reach, TrianglePatch&
   }
   Box box;
   box.include(position);
-  std::get_if<TriangleOctree>(structure_.get())->for_each_in_box(box.grown(reach), [&](std::uint32_t face) {
-    const auto [a, b, c] = mesh_->corners(face);
+  std::get_if<TriangleOctree>(&inside_->structure)->for_each_in_box(box.grown(reach), [&](std::uint32_t face) {
+    const auto [a, b, c] = mesh().corners(face);
     const TrianglePoint at = closest_point_on_triangle(position, a, b, c);
     visit(face, std::sqrt(at.squared_distance), Vec3(position - at.point));
   });
 }
 
 double TriangleIndex::error(const Vec3& position) const noexcept {
-  const Bvh* bvh = std::get_if<Bvh>(structure_.get());
+  const Bvh* bvh = std::get_if<Bvh>(&inside_->structure);
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
@@ -160,7 +171,7 @@ bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, doubl
   bool free = true;
   scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (distance > touch + margin || !free) return;
-    const auto [a, b, c] = mesh_->corners(face);
+    const auto [a, b, c] = mesh().corners(face);
     free = closest_point_on_triangle(end, a, b, c).squared_distance > blocked * blocked;
     add_contact(face, end, touch, sides, contacts);
   });
@@ -172,7 +183,7 @@ bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, doubl
 
 SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
-  const double first_part = first_look_in_edges * mesh_->mean_edge() / direction.norm();
+  const double first_part = first_look_in_edges * mesh().mean_edge() / direction.norm();
   if (first_part >= 0.5) return sweep_part(motion, radius, sides, patch);
   // A probe that leaves one face usually drops right onto the next: look near before searching the whole way.
   SweptHit hit = sweep_part({motion.from, motion.from + first_part * direction}, radius, sides, patch);
@@ -189,7 +200,7 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
   const double blocked = radius + blocked_in_skins * tolerance_.skin;
   SweptHit best;
   if (length == 0.0) return best;
-  if (length > long_motion_in_edges * mesh_->mean_edge()) {
+  if (length > long_motion_in_edges * mesh().mean_edge()) {
     std::visit(
         [&](const auto& structure) {
           along(structure, motion, grown, [&](std::uint32_t face) {
@@ -197,7 +208,7 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
             return best.t;
           });
         },
-        *structure_);
+        inside_->structure);
     return best;
   }
   const double touch = radius + touch_in_skins * tolerance_.skin;
@@ -233,13 +244,13 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
 
 void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
                                 ContactSet& out) const noexcept {
-  const auto [a, b, c] = mesh_->corners(face);
+  const auto [a, b, c] = mesh().corners(face);
   add_triangle_contact(face, a, b, c, position, reach, sides, tolerance_, out);
 }
 
 void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {
   settle_edge_contacts(
-      position, tolerance_, [&](std::uint32_t face) { return mesh_->corners(face); }, contacts);
+      position, tolerance_, [&](std::uint32_t face) { return mesh().corners(face); }, contacts);
 }
 
 void TriangleIndex::remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,

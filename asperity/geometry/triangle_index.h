@@ -14,7 +14,8 @@ namespace asperity {
 /// Which structure answers the elementary queries.
 enum class SearchStructure { bvh, octree };
 
-/// One query interface over a mesh and either search structure. Owns both mesh and structure.
+/// One query interface over a mesh and either search structure. Owns both mesh and structure; copies share them, so
+/// that copying costs nothing.
 ///
 /// Elementary queries are exact. The swept queries treat the probe as a ball of radius r plus a thin `skin` (1e-6 of
 /// the mean edge): resting on the surface means resting one skin above it, which keeps rounding from
@@ -28,11 +29,18 @@ class TriangleIndex {
   static TriangleIndex build(TriangleMesh mesh, SearchStructure structure = SearchStructure::bvh,
                              const BvhSettings& settings = {});
 
-  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return inside_->mesh; }
   /// Identity that tells patches of different indices apart; never 0.
   [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
+  /// Identity that an index has in common with all that were made of it by moving vertices (MeshRefitter): the same
+  /// triangles and vertices by the same numbers, in other places. [any]
+  [[nodiscard]] std::uint64_t lineage() const noexcept { return lineage_; }
+  /// What a search costs (boxes met by a random line) compared with the tree as it was built: 1 for a built one, more
+  /// for one refitted to a mesh that has been bent far. Above about 2 building anew pays. [any]
+  [[nodiscard]] double cost_ratio() const noexcept;
   /// Thickness that separates a resting probe from the surface (m).
   [[nodiscard]] double skin() const noexcept { return tolerance_.skin; }
+  /// Bytes of mesh and structure, however many copies share them. [any]
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
   /// Nearest point of the surface within `bound` (m); found() is false when there is none. [servo]
@@ -44,20 +52,23 @@ class TriangleIndex {
   /// Calls visit(face) for every triangle whose bounding box meets `box`; may repeat a face with the octree. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const {
-    std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, *structure_);
+    std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, inside_->structure);
   }
+  /// Calls visit(one, other) once for every pair of triangles whose boxes meet (m; one for each triangle, around it),
+  /// and perhaps for some that miss each other by a rounding. [build]
+  void for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const;
   /// Calls visit(face), roughly from near to far, for every triangle whose bounding box grown by `radius` (m) the
   /// segment meets; visit answers the fraction of the segment beyond which nothing is wanted any more. [servo]
   template <class Visit>
   void for_each_along(const Segment& segment, double radius, Visit&& visit) const {
-    if (const auto* bvh = std::get_if<Bvh>(structure_.get())) {
+    if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) {
       bvh->for_each_along(segment, radius, visit);
       return;
     }
     Box box;
     box.include(segment.from);
     box.include(segment.to);
-    std::get_if<TriangleOctree>(structure_.get())->for_each_in_box(box.grown(radius), [&](std::uint32_t face) {
+    std::get_if<TriangleOctree>(&inside_->structure)->for_each_in_box(box.grown(radius), [&](std::uint32_t face) {
       visit(face);
     });
   }
@@ -71,7 +82,17 @@ class TriangleIndex {
   void contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch, ContactSet& out) const noexcept;
 
  private:
+  friend class MeshRefitter;
+  /// Mesh and structure stay in place, as the structure refers to the mesh.
+  struct Inside {
+    explicit Inside(TriangleMesh of) : mesh(std::move(of)) {}
+    TriangleMesh mesh;
+    std::variant<Bvh, TriangleOctree> structure;
+    double built_cost = 1.0;  ///< of a hierarchy when it was built
+  };
+
   TriangleIndex() = default;
+  TriangleIndex(std::shared_ptr<const Inside> inside, std::uint64_t lineage);
   /// Whether the patch covers the ball (position, reach), refilling it where that can help.
   bool ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept;
   void gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept;
@@ -92,10 +113,9 @@ class TriangleIndex {
   void sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides, SweptHit& best) const noexcept;
   void add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides, ContactSet& out) const noexcept;
 
-  // Behind pointers so that moving the index keeps the structure's reference to the mesh valid.
-  std::unique_ptr<const TriangleMesh> mesh_;
-  std::unique_ptr<const std::variant<Bvh, TriangleOctree>> structure_;
+  std::shared_ptr<const Inside> inside_;
   std::uint64_t identity_ = 0;
+  std::uint64_t lineage_ = 0;
   ContactTolerance tolerance_;
 };
 

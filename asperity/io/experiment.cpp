@@ -58,6 +58,12 @@ SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, doubl
     if (foot.found()) nearest = {foot.point, parametric->normal(parametric->jet(hint.parametric.uv))};
     return nearest;
   }
+  if (const CustomSurface* custom = custom_of(surface)) {
+    const Foot foot = custom->closest(p, infinity, hint);
+    distance = foot.distance;
+    if (foot.found()) nearest = {foot.point, custom->outward(foot.point)};
+    return nearest;
+  }
   if (base_of(surface) == nullptr) {
     const IsoSurface* iso = iso_of(surface);
     const IsoView view = iso->view(iso->field().levels() - 1);
@@ -85,12 +91,56 @@ Surface carrier_of(const Surface& surface) {
   return carrier ? Surface(std::make_shared<const ParametricSurface>(std::move(*carrier))) : surface;
 }
 
-/// The nearest point of all surfaces.
+/// What the hand can reach of the scene's bounds: strokes are laid in the workspace.
+Box in_workspace(const View& view, const Box& bounds) {
+  if (view.identity()) return bounds;
+  Box out;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    out.include(view.to_workspace(Vec3((corner & 1U) != 0 ? bounds.upper.x() : bounds.lower.x(),
+                                       (corner & 2U) != 0 ? bounds.upper.y() : bounds.lower.y(),
+                                       (corner & 4U) != 0 ? bounds.upper.z() : bounds.lower.z())));
+  }
+  return out;
+}
+
+/// A stroke as it runs through the scene.
+StrokePath in_scene(const View& view, const StrokePath& path) {
+  return view.identity() ? path
+                         : path.mapped([&](const Vec3& p) { return view.to_scene(p); },
+                                       [&](const Vec3& n) { return Vec3(view.orientation * n); });
+}
+
+/// Says what asks for levels of detail that no coat has, and what of them is never used.
+void note_detail(std::span<const Instance> instances, const SceneSettings& settings, SceneContext& context) {
+  bool dilation = false;
+  bool low_pass = false;
+  for (const Instance& instance : instances) {
+    const ReliefSurface* relief = relief_of(instance);
+    if (relief == nullptr || relief->coat().levels() == 0) continue;
+    const bool ball = relief->coat().maps().detail()->kind() == DetailKind::dilation;
+    dilation = dilation || ball;
+    low_pass = low_pass || !ball;
+    if (ball && settings.tip_radius == 0.0 && settings.view.camera.pixels == 0)
+      context.note(
+          fmt::format("surface \"{}\": its levels of detail are those of a ball, and probe.tip is 0: the finest "
+                      "one is felt throughout",
+                      instance.name));
+  }
+  if (settings.tip_radius > 0.0 && !dilation)
+    context.note("probe.tip: no coat has levels of detail by dilation (\"detail\": \"dilation\"), so a point is felt");
+  if (settings.view.camera.pixels > 0 && !dilation && !low_pass)
+    context.note(
+        "view.camera: no coat has levels of detail (\"detail\"), so what is too small to be seen is felt all the same");
+}
+
+/// The nearest point of all surfaces, in the workspace.
 SurfaceProjector projector(const Scene& scene) {
   std::vector<Surface> carriers;
   for (const Instance& instance : scene.instances()) carriers.push_back(carrier_of(instance.surface));
   return [&scene, carriers = std::move(carriers),
-          hints = std::vector<Hint>(scene.instances().size())](const Vec3& p) mutable {
+          hints = std::vector<Hint>(scene.instances().size())](const Vec3& hand) mutable {
+    const View& view = scene.settings().view;
+    const Vec3 p = view.identity() ? hand : view.to_scene(hand);
     SurfacePoint best{p, Vec3::Zero()};
     double nearest = infinity;
     for (std::size_t i = 0; i < scene.instances().size(); ++i) {
@@ -102,6 +152,10 @@ SurfaceProjector projector(const Scene& scene) {
       nearest = distance;
       best.point = instance.world_from_object.apply(found.point);
       best.normal = instance.world_from_object.rotate(found.normal).normalized();
+    }
+    if (!view.identity()) {
+      best.point = view.to_workspace(best.point);
+      best.normal = view.orientation.conjugate() * best.normal;
     }
     return best;
   };
@@ -190,7 +244,14 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
       bodiless ? std::min(1000.0, device.value.max_stiffness) : instances.front().material.stiffness;
   ASPERITY_TRY(ScenePart<ProbeSettings> probe, read_probe(root.raw("probe"), "probe", device.value, stiffness));
   const Box bounds = bodiless ? effect_bounds(effects) : base_bounds(instances);
-  ASPERITY_TRY(ScenePart<StrokeSettings> stroke, read_stroke(root.raw("stroke"), "stroke", bounds, context));
+  SceneSettings settings;
+  settings.probe_radius = probe.value.radius;
+  settings.tip_radius = probe.value.tip;
+  ASPERITY_TRY(settings.view, read_view(root, bounds));
+  ASPERITY_CHECK(read_change(root, settings));
+  note_detail(instances, settings, context);
+  ASPERITY_TRY(ScenePart<StrokeSettings> stroke,
+               read_stroke(root.raw("stroke"), "stroke", in_workspace(settings.view, bounds), context));
   const SceneJson* stroke_json = root.raw("stroke");
   const auto says = [&](const char* key) { return stroke_json != nullptr && stroke_json->contains(key); };
   if (bodiless && !says("depth") && !says("normal_force") && !says("path")) {
@@ -198,12 +259,13 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
     stroke.value.depth = 0.5 * bounds.extent().y();
     stroke.canonical["depth"] = stroke.value.depth;
   }
-  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), probe.value.radius, std::move(effects)));
+  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), settings, std::move(effects)));
   if (progress) progress("laying the stroke", 0.0);
   Result<StrokePath> path = build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene));
   if (!path) return std::move(path).error().at("stroke");
   for (const Instance& instance : scene.instances())
-    note_rendering(instance, *path, stroke.value.speed, probe.value.rate, context);
+    note_rendering(instance, in_scene(scene.settings().view, *path), stroke.value.speed / scene.settings().view.zoom,
+                   probe.value.rate, context);
 
   root.write("device", std::move(device.canonical));
   root.write("hand", std::move(hand.canonical));
@@ -253,7 +315,7 @@ Result<Experiment> with_law(const Experiment& experiment, const Law& law) {
     std::vector<Instance> instances(experiment.scene.instances().begin(), experiment.scene.instances().end());
     for (Instance& instance : instances) instance.law = law;
     std::vector<FieldEffect> effects(experiment.scene.effects().begin(), experiment.scene.effects().end());
-    ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), experiment.scene.probe_radius(), std::move(effects)));
+    ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), experiment.scene.settings(), std::move(effects)));
     Experiment changed = experiment;
     changed.scene = std::move(scene);
     SceneJson json = SceneJson::parse(experiment.canonical_json);

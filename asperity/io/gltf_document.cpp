@@ -18,6 +18,8 @@ constexpr std::size_t most_values = 20'000'000;
 /// Geometry lies less deep; what is deeper belongs to extras and extensions.
 constexpr int deepest_level = 16;
 constexpr std::uint64_t largest_buffer = std::uint64_t{4} << 30U;
+/// Of an image file.
+constexpr std::uint64_t largest_resource = std::uint64_t{2} << 30U;
 
 // ---- the keys of glTF's geometry
 
@@ -84,7 +86,12 @@ constexpr Key root_keys[] = {{"scene", Kind::reference, false, "scenes"},
 constexpr Key buffer_keys[] = {{"uri", Kind::word}, {"byteLength", Kind::size, true}};
 constexpr Key buffers_key[] = {{"buffers", Kind::objects, false, nullptr, 0, buffer_keys}};
 
-bool is_root_key(std::string_view name) {
+constexpr const char* material_keys[] = {"meshes", "materials", "textures", "samplers", "images", "extensions"};
+
+bool is_root_key(std::string_view name, GltfParts parts) {
+  for (const char* key : material_keys) {
+    if (parts == GltfParts::geometry_and_materials && name == key) return true;
+  }
   for (const char* kept : {"asset", "extensionsUsed", "extensionsRequired", "buffers", "skins", "animations"}) {
     if (name == kept) return true;
   }
@@ -101,7 +108,7 @@ Error malformed(std::string what, std::string place, std::string accepted) {
 /// Copies the keys of a table out of the file's JSON and refuses values of another type.
 class JsonCheck {
  public:
-  explicit JsonCheck(const Json& root) : root_(root) {}
+  JsonCheck(const Json& root, GltfParts parts) : root_(root), parts_(parts) {}
 
   Result<Json> object(const Json& from, const std::string& place, std::span<const Key> keys) const {
     if (!from.is_object()) return malformed("is no object", place, "an object");
@@ -178,15 +185,20 @@ class JsonCheck {
   [[nodiscard]] Result<Json> attributes(const Json& from, const std::string& place, const char* section) const {
     if (!from.is_object()) return malformed("is no object", place, "an object of accessor indices");
     Json copy = Json::object();
-    for (const char* semantic : {"POSITION", "TEXCOORD_0"}) {
+    const auto take = [&](const std::string& semantic) -> Status {
       const auto found = from.find(semantic);
-      if (found == from.end()) continue;
+      if (found == from.end()) return success();
       ASPERITY_TRY(copy[semantic], reference(*found, fmt::format("{}.{}", place, semantic), section));
-    }
+      return success();
+    };
+    ASPERITY_CHECK(take("POSITION"));
+    const int sets = parts_ == GltfParts::geometry ? 1 : most_texcoords;
+    for (int set = 0; set < sets; ++set) ASPERITY_CHECK(take(fmt::format("TEXCOORD_{}", set)));
     return copy;
   }
 
   const Json& root_;
+  GltfParts parts_;
 };
 
 // ---- what the file needs from its reader
@@ -384,9 +396,9 @@ Status GltfDocument::read_container(std::string_view bytes) {
   return success();
 }
 
-Status GltfDocument::read_json() {
+Status GltfDocument::read_json(GltfParts parts) {
   std::size_t values = 0;
-  // Images, materials, extras and the like never become objects in memory.
+  // Unless they are asked for, images, materials, extras and the like never become objects in memory.
   const auto keep = [&](int depth, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start) {
       return ++values <= most_values && depth <= deepest_level;
@@ -395,7 +407,7 @@ Status GltfDocument::read_json() {
     if (event != Json::parse_event_t::key) return true;
     const auto* name = parsed.get_ptr<const std::string*>();
     if (name == nullptr) return true;
-    return depth == 1 ? is_root_key(*name) : *name != "extras";
+    return depth == 1 ? is_root_key(*name, parts) : parts == GltfParts::geometry_and_materials || *name != "extras";
   };
   Json root;
   try {
@@ -414,11 +426,22 @@ Status GltfDocument::read_json() {
   if (!root.is_object()) return malformed("is no JSON object", {}, accepted_container);
   ASPERITY_CHECK(check_version(root));
   ASPERITY_CHECK(check_extensions(root));
-  const JsonCheck check(root);
+  const JsonCheck check(root, parts);
   ASPERITY_TRY(Json geometry, check.object(root, {}, root_keys));
   ASPERITY_TRY(const Json buffers, check.object(root, {}, buffers_key));
   for (const Json& buffer : buffers.value("buffers", Json::array())) {
     buffers_.push_back({buffer.value("uri", ""), buffer["byteLength"].get<std::size_t>(), nullptr});
+  }
+  for (const Json& view : geometry.value("bufferViews", Json::array())) {
+    views_.push_back({view["buffer"].get<std::size_t>(), view.value("byteOffset", std::size_t{0}),
+                      view["byteLength"].get<std::size_t>()});
+  }
+  if (parts == GltfParts::geometry_and_materials) {
+    Json kept = Json::object();
+    for (const char* key : material_keys) {
+      if (const auto found = root.find(key); found != root.end()) kept[key] = *found;
+    }
+    materials_ = kept.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
   note_what_is_left_out(root, notes_);
   geometry["asset"] = {{"version", "2.0"}};
@@ -426,27 +449,28 @@ Status GltfDocument::read_json() {
   return success();
 }
 
-Result<GltfDocument> GltfDocument::open(std::string_view bytes, const std::filesystem::path* folder) {
+Result<GltfDocument> GltfDocument::open(std::string_view bytes, const std::filesystem::path* folder, GltfParts parts) {
   GltfDocument document;
   document.folder_ = folder;
   ASPERITY_CHECK(document.read_container(bytes));
-  ASPERITY_CHECK(document.read_json());
+  ASPERITY_CHECK(document.read_json(parts));
   return document;
 }
 
-Status GltfDocument::read_external(Buffer& buffer, const std::string& place) const {
-  const std::string name = without_percents(buffer.uri);
+Result<std::filesystem::path> GltfDocument::resolve(const std::string& uri, const std::string& place) const {
+  const std::string name = without_percents(uri);
   const std::string shown = name.substr(0, 200);
   const auto error = [&](ErrorCode code, std::string what) {
-    return Error{code, std::move(what), {}, place + ".uri", "a file path relative to the .gltf file, or a data URI"};
+    return Error{code, std::move(what), {}, place, "a file path relative to the .gltf file, or a data URI"};
   };
-  if (has_scheme(buffer.uri) || name.front() == '/' || name.front() == '\\' || name.find('\0') != std::string::npos) {
+  if (has_scheme(uri) || name.empty() || name.front() == '/' || name.front() == '\\' ||
+      name.find('\0') != std::string::npos) {
     return error(ErrorCode::file_unsupported, fmt::format("is \"{}\", which is no relative path", shown));
   }
   if (folder_ == nullptr) {
     return error(ErrorCode::file_unsupported, fmt::format("names the file \"{}\", which is not in memory", shown));
   }
-  const std::filesystem::path path = *folder_ / name;
+  std::filesystem::path path = *folder_ / name;
   std::error_code problem;
   if (!std::filesystem::exists(path, problem)) {
     return error(ErrorCode::file_missing, fmt::format("names \"{}\": no such file", shown));
@@ -454,16 +478,75 @@ Status GltfDocument::read_external(Buffer& buffer, const std::string& place) con
   if (!std::filesystem::is_regular_file(path, problem)) {
     return error(ErrorCode::file_missing, fmt::format("names \"{}\", which is not a regular file", shown));
   }
-  const std::uintmax_t size = std::filesystem::file_size(path, problem);
-  if (!problem && size < buffer.length) return too_short(buffer.length, fmt::format("\"{}\"", shown), size, place);
-  buffer.bytes = std::make_unique<std::string>(buffer.length, '\0');
+  return path;
+}
+
+/// Reads `length` bytes from the file's begin.
+Result<std::string> read_start(const std::filesystem::path& path, std::size_t length, const std::string& place) {
+  std::string bytes(length, '\0');
   std::ifstream stream(path, std::ios::binary);
-  stream.read(buffer.bytes->data(), static_cast<std::streamsize>(buffer.length));
-  if (problem || !stream) {
-    buffer.bytes.reset();
-    return error(ErrorCode::file_missing, fmt::format("names \"{}\", which cannot be read", shown));
+  stream.read(bytes.data(), static_cast<std::streamsize>(length));
+  if (stream) return bytes;
+  return Error{ErrorCode::file_missing,
+               fmt::format("names \"{}\", which cannot be read", path.filename().string()),
+               {},
+               place,
+               "a file that may be read"};
+}
+
+Status GltfDocument::read_external(Buffer& buffer, const std::string& place) const {
+  ASPERITY_TRY(const std::filesystem::path path, resolve(buffer.uri, place + ".uri"));
+  std::error_code problem;
+  const std::uintmax_t size = std::filesystem::file_size(path, problem);
+  if (!problem && size < buffer.length) {
+    return too_short(buffer.length, fmt::format("\"{}\"", without_percents(buffer.uri).substr(0, 200)), size, place);
   }
+  ASPERITY_TRY(std::string bytes, read_start(path, buffer.length, place + ".uri"));
+  buffer.bytes = std::make_unique<std::string>(std::move(bytes));
   return success();
+}
+
+Result<std::string> GltfDocument::resource(const std::string& uri, const std::string& place) const {
+  if (uri.starts_with("data:")) {
+    const std::string_view text = uri;
+    const std::size_t comma = std::min(text.find(','), text.size());
+    std::string bytes;
+    if (comma == text.size() || !text.substr(0, comma).ends_with(";base64") ||
+        !decode_base64(text.substr(comma + 1), std::string::npos / 2, bytes)) {
+      return malformed("is no data URI of base64", place, "data:image/png;base64,...");
+    }
+    return bytes;
+  }
+  ASPERITY_TRY(const std::filesystem::path path, resolve(uri, place));
+  std::error_code problem;
+  const std::uintmax_t size = std::filesystem::file_size(path, problem);
+  if (problem || size > largest_resource) {
+    return Error{ErrorCode::too_large,
+                 fmt::format("names \"{}\", which has {} bytes", uri.substr(0, 200), size),
+                 {},
+                 place,
+                 "files up to 2 GiB"};
+  }
+  return read_start(path, static_cast<std::size_t>(size), place);
+}
+
+Result<std::string_view> GltfDocument::view(std::size_t index) {
+  const std::string place = fmt::format("bufferViews[{}]", index);
+  if (index >= views_.size()) {
+    return Error{
+        ErrorCode::bad_mesh, fmt::format("is one of {}", views_.size()), {}, place, "indices of things that are there"};
+  }
+  const View& one = views_[index];
+  ASPERITY_TRY(const std::string_view bytes, buffer(one.buffer));
+  if (one.offset > bytes.size() || one.length > bytes.size() - one.offset) {
+    return Error{
+        ErrorCode::bad_mesh,
+        fmt::format("reaches from byte {} over {} bytes in a buffer of {}", one.offset, one.length, bytes.size()),
+        {},
+        place,
+        "views that lie within their buffer"};
+  }
+  return bytes.substr(one.offset, one.length);
 }
 
 Result<std::string_view> GltfDocument::buffer(std::size_t index) {

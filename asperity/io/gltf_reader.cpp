@@ -10,6 +10,7 @@
 #include <set>
 
 #include "asperity/io/gltf_document.h"
+#include "asperity/io/gltf_looks.h"
 #include "asperity/io/mesh_readers.h"
 
 namespace asperity::mesh_readers {
@@ -207,11 +208,12 @@ class AccessorReader {
 /// Walks the scene and gathers its triangles.
 class SceneGatherer {
  public:
-  SceneGatherer(const tinygltf::Model& model, GltfDocument& document) : model_(model), accessors_(model, document) {
+  SceneGatherer(const tinygltf::Model& model, GltfDocument& document, const PrimitiveLooks* looks)
+      : model_(model), accessors_(model, document), looks_(looks) {
     source_.notes = std::move(document.notes());
   }
 
-  Result<MeshSource> run() {
+  Result<GltfTriangles> run() {
     source_.notes.emplace_back("lengths are metres, as glTF defines them");
     measure_meshes();
     ASPERITY_TRY(const std::vector<int> roots, roots_of_scene());
@@ -230,7 +232,7 @@ class SceneGatherer {
                       {}, "a scene with at least one triangle");
     }
     finish();
-    return std::move(source_);
+    return GltfTriangles{std::move(source_), std::move(look_of_triangle_)};
   }
 
  private:
@@ -344,6 +346,7 @@ class SceneGatherer {
     const auto& primitives = model_.meshes[mesh].primitives;
     first_vertex_.clear();
     for (std::size_t i = 0; i < primitives.size(); ++i) {
+      look_ = looks_ != nullptr ? &looks_->at(mesh).at(i) : nullptr;
       ASPERITY_CHECK(
           add_primitive(primitives[i], placement, fmt::format("meshes[{}].primitives[{}]", mesh, i), node_place));
     }
@@ -367,8 +370,11 @@ class SceneGatherer {
     ASPERITY_TRY(const std::size_t corners, corner_count(primitive, vertices, place, indices));
     const auto corner = [&](std::size_t i) { return indices.empty() ? static_cast<std::uint32_t>(i) : indices[i]; };
     std::vector<Vec2f> uvs;
-    if (const auto uv = primitive.attributes.find("TEXCOORD_0"); uv != primitive.attributes.end()) {
-      ASPERITY_TRY(uvs, texture_coordinates(uv->second, vertices, place));
+    const std::string set = fmt::format("TEXCOORD_{}", look_ != nullptr ? look_->texcoord : 0);
+    if (const auto uv = primitive.attributes.find(set); uv != primitive.attributes.end()) {
+      ASPERITY_TRY(uvs, texture_coordinates(uv->second, vertices, fmt::format("{}.attributes.{}", place, set)));
+    } else if (look_ != nullptr && look_->needs_uvs) {
+      source_.notes.push_back(fmt::format("{} has maps, but no {}: they are flat there", place, set));
     }
     add_triangles(primitive.mode, corners, corner, first, uvs, placement.linear.determinant() < 0.0);
     return success();
@@ -434,9 +440,8 @@ class SceneGatherer {
     return corners;
   }
 
-  Result<std::vector<Vec2f>> texture_coordinates(int index, std::size_t vertices, const std::string& place) {
+  Result<std::vector<Vec2f>> texture_coordinates(int index, std::size_t vertices, const std::string& at) {
     const tinygltf::Accessor& accessor = accessors_.accessor(index);
-    const std::string at = place + ".attributes.TEXCOORD_0";
     const int type = accessor.componentType;
     const bool floats = type == TINYGLTF_COMPONENT_TYPE_FLOAT;
     const bool bytes = type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
@@ -459,7 +464,9 @@ class SceneGatherer {
     uvs.reserve(vertices);
     for (std::size_t i = 0; i < vertices; ++i) {
       // glTF counts v down from a map's upper edge, OBJ files and the maps here up from its lower one.
-      uvs.emplace_back(number(2 * i), 1.0F - number(2 * i + 1));
+      const Vec2f stored(number(2 * i), number(2 * i + 1));
+      const Vec2f placed = look_ != nullptr && look_->moved ? look_->transform(stored) : stored;
+      uvs.emplace_back(placed.x(), 1.0F - placed.y());
       if (!uvs.back().allFinite()) {
         return error_at(ErrorCode::bad_mesh, fmt::format("of vertex {} (counted from 0) are not finite", i), at,
                         "finite coordinates");
@@ -476,6 +483,7 @@ class SceneGatherer {
       if (mirrored) std::swap(j, k);
       const std::array<std::uint32_t, 3> local = {corner(i), corner(j), corner(k)};
       source_.triangles.push_back({first + local[0], first + local[1], first + local[2]});
+      if (look_ != nullptr) look_of_triangle_.push_back(look_->number);
       if (uvs.empty()) return;
       source_.corner_uvs.reserve(source_.triangles.capacity());
       source_.corner_uvs.resize(source_.triangles.size(), {Vec2f::Zero(), Vec2f::Zero(), Vec2f::Zero()});
@@ -514,6 +522,11 @@ class SceneGatherer {
                                           model_.meshes.size() - used, model_.meshes.size()));
     }
     if (with_uvs_ == source_.triangles.size()) return;
+    if (looks_ != nullptr && with_uvs_ > 0) {
+      // The maps of some parts must not go with the missing coordinates of others.
+      source_.corner_uvs.resize(source_.triangles.size(), {Vec2f::Zero(), Vec2f::Zero(), Vec2f::Zero()});
+      return;
+    }
     source_.corner_uvs = {};
     if (with_uvs_ > 0) {
       source_.notes.push_back(fmt::format("texture coordinates left out: only {} of {} triangles have them", with_uvs_,
@@ -523,7 +536,10 @@ class SceneGatherer {
 
   const tinygltf::Model& model_;
   AccessorReader accessors_;
+  const PrimitiveLooks* looks_ = nullptr;
+  const PrimitiveLook* look_ = nullptr;  ///< of the current primitive
   MeshSource source_;
+  std::vector<std::uint32_t> look_of_triangle_;
   std::map<int, std::uint32_t> first_vertex_;  ///< of the accessors that the current node has placed
   std::vector<Amount> amounts_;                ///< of each mesh
   Amount total_;                               ///< of the scene
@@ -536,8 +552,7 @@ class SceneGatherer {
 
 }  // namespace
 
-Result<MeshSource> read_gltf(std::string_view bytes, const std::filesystem::path* folder) {
-  ASPERITY_TRY(GltfDocument document, GltfDocument::open(bytes, folder));
+Result<GltfTriangles> read_triangles(GltfDocument& document, const PrimitiveLooks* looks) {
   const std::string& json = document.geometry_json();
   if (json.size() > std::numeric_limits<unsigned int>::max()) {
     return error_at(ErrorCode::too_large, "has more than 4 GiB of JSON", {}, "a smaller file");
@@ -552,7 +567,16 @@ Result<MeshSource> read_gltf(std::string_view bytes, const std::filesystem::path
     return error_at(ErrorCode::file_malformed, "cannot be read as glTF: " + error.substr(0, 200), {},
                     "a glTF 2.0 file (.gltf or .glb)");
   }
-  return SceneGatherer(model, document).run();
+  if (looks != nullptr && looks->size() != model.meshes.size()) {
+    return error_at(ErrorCode::file_malformed, "has meshes that cannot be read", "meshes", "a complete glTF file");
+  }
+  return SceneGatherer(model, document, looks).run();
+}
+
+Result<MeshSource> read_gltf(std::string_view bytes, const std::filesystem::path* folder) {
+  ASPERITY_TRY(GltfDocument document, GltfDocument::open(bytes, folder));
+  ASPERITY_TRY(GltfTriangles triangles, read_triangles(document, nullptr));
+  return std::move(triangles.mesh);
 }
 
 }  // namespace asperity::mesh_readers

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <csetjmp>
 #include <cstdint>
 #include <cstdio>
@@ -372,6 +373,9 @@ Result<Image> read_image_bytes(std::string_view bytes, const std::string& name) 
     if (starts_with(png_signature, bytes)) {
       return image_error(ErrorCode::file_truncated, "the file ends within the PNG signature", name);
     }
+    if (is_exr(bytes)) {
+      return image_error(ErrorCode::file_unsupported, "is an OpenEXR image, of which only heights are read", name);
+    }
     return image_error(ErrorCode::file_unsupported, "is neither a PNG nor a JPEG", name);
   } catch (const std::bad_alloc&) {
     return image_error(ErrorCode::too_large, "there is no memory to read the image", name);
@@ -385,6 +389,33 @@ Result<Image> read_image(const std::filesystem::path& path) {
   } catch (const std::exception& error) {
     return image_error(ErrorCode::file_missing, fmt::format("cannot be read: {}", error.what()), path.string());
   }
+}
+
+Result<FloatImage> read_float_image(const std::filesystem::path& path, const std::string& channel) {
+  try {
+    ASPERITY_TRY(const std::string bytes, read_bytes(path));
+    return read_float_image_bytes(bytes, path.string(), channel);
+  } catch (const std::exception& error) {
+    return image_error(ErrorCode::file_missing, fmt::format("cannot be read: {}", error.what()), path.string());
+  }
+}
+
+Result<HeightMap> float_heights(const FloatImage& image, const HeightMapSettings& settings, bool normalised) {
+  const auto bad = [](const char* place, double value, const char* accepted) {
+    return Error{ErrorCode::bad_value, fmt::format("is {}", value), "", place, accepted};
+  };
+  if (!std::isfinite(settings.amplitude) || settings.amplitude < 0.0)
+    return bad("amplitude", settings.amplitude, "a length of 0 or more");
+  if (!std::isfinite(settings.offset)) return bad("offset", settings.offset, "a finite length");
+  const double sign = settings.white_is_deep ? -1.0 : 1.0;
+  const double low = normalised ? static_cast<double>(image.lowest) : 0.0;
+  const double span = normalised ? static_cast<double>(image.highest) - low : 1.0;
+  const double scale = span > 0.0 ? sign * settings.amplitude / span : 0.0;
+  std::vector<float> heights(image.values.size());
+  std::transform(image.values.begin(), image.values.end(), heights.begin(), [&](float value) {
+    return static_cast<float>(settings.offset + scale * (static_cast<double>(value) - low));
+  });
+  return HeightMap::build(std::move(heights), image.width, image.height, settings.wrap, settings.reconstruction);
 }
 
 Result<std::string> encode_png(const Image& image) {

@@ -103,6 +103,14 @@ void append_corner_vertices(std::string& bytes, const MeshView& mesh) {
 
 namespace mesh_readers {
 
+Result<std::string> read_mesh_file(const std::filesystem::path& path) {
+  try {
+    return read_file(path);
+  } catch (const std::exception& problem) {
+    return missing(path, fmt::format("cannot be read ({})", problem.what()));
+  }
+}
+
 bool TextCursor::next_line(std::string_view& line) {
   if (at_ >= text_.size()) return false;
   const std::size_t end = std::min(text_.find('\n', at_), text_.size());

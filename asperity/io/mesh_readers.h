@@ -14,6 +14,8 @@ namespace asperity::mesh_readers {
 /// More corners than any modeller writes; it bounds the time that triangulating one polygon can take.
 inline constexpr std::size_t most_corners = 1024;
 
+/// The whole of a mesh file. Errors, with its name: file_missing (or a folder), too_large. [build]
+Result<std::string> read_mesh_file(const std::filesystem::path& path);
 /// Errors of these functions carry no file name: read_mesh_bytes() fills it in. [build]
 Result<MeshSource> read_obj(std::string_view bytes);
 Result<MeshSource> read_ply(std::string_view bytes);

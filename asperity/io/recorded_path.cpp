@@ -16,22 +16,6 @@ namespace {
 
 constexpr std::size_t max_file_bytes = std::size_t{1} << 30U;
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r\"");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r\"") - first + 1);
-}
-
-std::vector<std::string_view> cells_of(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (;;) {
-    const auto comma = line.find(',');
-    cells.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return cells;
-    line.remove_prefix(comma + 1);
-  }
-}
-
 std::string line_place(std::size_t line) {
   return fmt::format("line {}", line);
 }
@@ -59,16 +43,16 @@ Result<double> unit_scale(std::string_view unit, bool is_time, std::size_t line)
 }
 
 Result<Sources> parse_header(std::string_view line, std::size_t number) {
-  const std::vector<std::string_view> cells = cells_of(line);
+  const std::vector<std::string_view> cells = csv_cells(line);
   Sources sources{};
   std::array<bool, 4> found{};
   for (std::size_t column = 0; column < cells.size(); ++column) {
     const auto bracket = cells[column].find('[');
-    const std::string_view name = trimmed(cells[column].substr(0, bracket));
+    const std::string_view name = csv_trimmed(cells[column].substr(0, bracket));
     std::string_view unit;
     if (bracket != std::string_view::npos) {
       unit = cells[column].substr(bracket + 1);
-      unit = trimmed(unit.substr(0, unit.find(']')));
+      unit = csv_trimmed(unit.substr(0, unit.find(']')));
     }
     for (std::size_t k = 0; k < wanted.size(); ++k) {
       if (found[k] || (name != wanted[k] && name != aliases[k])) continue;
@@ -111,7 +95,7 @@ Result<double> parse_cell(const std::vector<std::string_view>& cells, std::size_
 }
 
 Result<TimedPoint> parse_row(std::string_view line, const Sources& sources, std::size_t number) {
-  const std::vector<std::string_view> cells = cells_of(line);
+  const std::vector<std::string_view> cells = csv_cells(line);
   std::array<double, 4> values{};
   for (std::size_t k = 0; k < values.size(); ++k) {
     ASPERITY_TRY(values[k], parse_cell(cells, k, sources[k], number));
@@ -146,7 +130,7 @@ Result<std::vector<TimedPoint>> parse_recorded_path(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   for (std::size_t number = 1; !text.empty(); ++number) {
     const auto end = text.find('\n');
-    const std::string_view line = trimmed(text.substr(0, end));
+    const std::string_view line = csv_trimmed(text.substr(0, end));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (line.empty() || line.front() == '#') continue;
     if (!sources) {
@@ -204,6 +188,22 @@ Result<std::vector<TimedPoint>> read_recorded_path(const std::string& path) {
   }
   ASPERITY_TRY(const std::string text, read_text(path));
   return in_file(parse_recorded_path(text));
+}
+
+std::string_view csv_trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r\"");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r\"") - first + 1);
+}
+
+std::vector<std::string_view> csv_cells(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (;;) {
+    const auto comma = line.find(',');
+    cells.push_back(csv_trimmed(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return cells;
+    line.remove_prefix(comma + 1);
+  }
 }
 
 }  // namespace asperity

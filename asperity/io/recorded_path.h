@@ -10,6 +10,11 @@
 
 namespace asperity {
 
+/// A cell of a CSV line without blanks and quotation marks around it. [any]
+std::string_view csv_trimmed(std::string_view text);
+/// The cells of a CSV line, trimmed; they point into it. [any]
+std::vector<std::string_view> csv_cells(std::string_view line);
+
 /// Reads a recorded probe path from CSV text: a header line that names time, x, y, z (position_x, position_y,
 /// position_z of an exported trace count as well), each with an optional unit in brackets ("x [mm]"; without one: SI),
 /// in any order; other columns are left out. Blank lines and lines that start with '#' are skipped. Times start at zero

@@ -7,6 +7,7 @@
 
 #include "asperity/io/image_io.h"
 #include "asperity/io/scene_heights.h"
+#include "asperity/io/scene_layers.h"
 
 namespace asperity {
 namespace {
@@ -34,7 +35,18 @@ class CoatReader {
     if (const SceneJson* stitching = reader_.raw("stitching")) {
       ASPERITY_TRY(settings.stitching, read_stitching(*stitching, reader_.place_of("stitching"), context_, reader_));
     }
-    Result<Coat> coat = Coat::build(mesh_, std::make_shared<const Mesostructure>(std::move(maps)), settings);
+    LayerHost host{mesh_.mean_edge(), mapping_ == Mapping::triplanar, tile, wrap_, {}};
+    ASPERITY_TRY(host.detail, read_detail(reader_));
+    if (host.detail) {
+      if (context_.progress) context_.progress("making levels of detail", 0.0);
+      ASPERITY_TRY(maps, with_detail(std::move(maps), *host.detail, reader_.place_of("detail")));
+    }
+    CoatParts parts;
+    parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(maps)));
+    ASPERITY_TRY(parts.layers, read_layers(reader_, host, context_));
+    ASPERITY_TRY(parts.materials, read_material_maps(reader_, host, context_));
+    ASPERITY_CHECK(reader_.status());
+    Result<Coat> coat = Coat::build(mesh_, std::move(parts), settings);
     if (!coat) return std::move(coat).error().at(reader_.place());
     return ScenePart<Coat>{std::move(*coat), std::move(reader_.canonical())};
   }
@@ -100,7 +112,7 @@ class CoatReader {
     if (pair) {
       tile = reader_.pair("tile", Dimension::length, Vec2::Ones(), Range::positive());
     } else if (given == nullptr && source_.sidecar()) {
-      tile = Vec2(source_.sidecar()->pixel.x() * heights.width(), source_.sidecar()->pixel.y() * heights.height());
+      tile = source_.tile();
       reader_.write("tile", SceneJson::array({tile.x(), tile.y()}));
       context_.note(fmt::format("coat: one repeat is {} x {} from {}", format_length(tile.x()), format_length(tile.y()),
                                 source_.sidecar()->file));
@@ -133,7 +145,15 @@ class CoatReader {
       reader_.write("repeat", *given);
       return;
     }
-    const double repeat = reader_.number("repeat", 1.0, Range::positive());
+    // What knows its size is laid at it.
+    double fallback = 1.0;
+    if (source_.from_library() && given == nullptr) {
+      fallback =
+          (mapping_ == Mapping::per_face ? mesh_.mean_edge() : texture_unit(mesh_)) / (magnify_ * source_.tile().x());
+      context_.note(fmt::format("coat: repeated {:.3g} times over the texture coordinates, so that one repeat is {}",
+                                fallback, format_length(magnify_ * source_.tile().x())));
+    }
+    const double repeat = reader_.number("repeat", fallback, Range::positive());
     repeat_ = Vec2(repeat, repeat);
   }
 

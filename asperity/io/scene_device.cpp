@@ -108,6 +108,7 @@ Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::st
   ProbeSettings probe;
   probe.dynamic = reader.choice("kind", kinds, 0) == 1;
   probe.radius = reader.quantity("radius", Dimension::length, 0.0, Range::not_negative());
+  probe.tip = reader.quantity("tip", Dimension::length, 0.0, Range::not_negative());
   probe.rate = reader.quantity("rate", Dimension::frequency, device.rate, Range{0.0, full_rate, true});
   probe.ideal = read_ideal(reader.raw("ideal"), place + ".ideal", stiffness, reader);
   probe.simulated = read_dynamic(reader.raw("dynamic"), place + ".dynamic", reader);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -125,15 +126,21 @@ class HeightGeneratorReader {
 Status HeightSourceReader::read_source() {
   const SceneJson* map = reader_.raw(key_);
   if (map == nullptr) {
-    reader_.fail(key_, "is missing", "an image file (PNG, JPEG) or an object with a generator");
+    reader_.fail(key_, "is missing",
+                 "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
   } else if (map->is_object()) {
     generated_ = true;
-    read_generator(*map);
+    if (map->contains("library")) {
+      ASPERITY_CHECK(read_library(*map));
+    } else {
+      read_generator(*map);
+    }
     reader_.refuse({"channel", "white_is", "height_range"}, "for a generated height map");
   } else if (map->is_string()) {
     return read_image_source(map->get_ref<const std::string&>());
   } else {
-    reader_.fail_type(key_, *map, "an image file (PNG, JPEG) or an object with a generator");
+    reader_.fail_type(key_, *map,
+                      "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
   }
   return reader_.status();
 }
@@ -144,9 +151,47 @@ void HeightSourceReader::read_generator(const SceneJson& json) {
   reader_.take(key_, std::move(generator));
 }
 
+Status HeightSourceReader::read_library(const SceneJson& json) {
+  ObjectReader reader(json, reader_.place_of(key_), "library relief");
+  const std::string name = reader.text("library", "");
+  const int size = reader.integer("size", 512, 16, 4096);
+  const std::uint64_t seed = reader.seed("seed", 0);
+  ASPERITY_CHECK(reader.status());
+  Result<LibraryRelief> relief = library_mesostructure(name, size, seed);
+  if (!relief) return std::move(relief).error().at(reader.place_of("library"));
+  library_ = std::move(*relief);
+  HeightSidecar known;
+  known.file = "the library";
+  known.width = known.height = size;
+  known.high = library_.amplitude;
+  known.pixel = library_.tile / size;
+  sidecar_ = known;
+  reader_.take(key_, std::move(reader));
+  return success();
+}
+
+/// Floats as the file stores them: metres, unless the scene says what their range stands for.
+Status HeightSourceReader::read_floats() {
+  const std::string channel = reader_.text("channel", "automatic");
+  ASPERITY_CHECK(reader_.status());
+  Result<FloatImage> image = read_float_image(path_, channel);
+  if (!image) {
+    Error error = std::move(image).error().in_file(path_.string());
+    if (error.place.empty()) error.place = reader_.place_of("channel");
+    return error;
+  }
+  floats_ = std::move(*image);
+  reader_.write(key_, path_.string());
+  return success();
+}
+
 Status HeightSourceReader::read_image_source(const std::string& file) {
   path_ = context_.resolve(file);
   if (context_.progress) context_.progress("reading height map", 0.0);
+  std::string extension = path_.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".exr") return read_floats();
   Result<Image> image = read_image(path_);
   if (!image) {
     Error error = std::move(image).error().in_file(path_.string());
@@ -173,6 +218,8 @@ Status HeightSourceReader::read_sidecar() {
   const auto member = [&](const char* key) { return json->contains(key) ? number((*json)[key]) : std::nan(""); };
   HeightSidecar sidecar;
   sidecar.file = path.filename().string();
+  sidecar.width = image_.width;
+  sidecar.height = image_.height;
   sidecar.low = member("height_min_m");
   sidecar.high = member("height_max_m");
   const bool sizes = member("width") == image_.width && member("height") == image_.height;
@@ -245,7 +292,17 @@ Status HeightSourceReader::read_scale(double magnify) {
     read_range(*range);
     return reader_.status();
   }
-  const bool flat = generated_ && spec_.kind == MesostructureKind::flat;
+  const bool flat = generated_ && library_.heights.empty() && spec_.kind == MesostructureKind::flat;
+  if (!floats_.values.empty() && !reader_.has("height")) {
+    // Values in metres, moved by an offset.
+    scale_ = {1.0, read_height("offset", 0.0, Range{})};
+    context_.note(fmt::format(
+        "{}: heights {} to {}, in metres as the EXR file stores them (\"height\" or "
+        "\"height_range\" says what its range stands for otherwise)",
+        who_, format_length(static_cast<double>(floats_.lowest)), format_length(static_cast<double>(floats_.highest))));
+    stored_metres_ = true;
+    return reader_.status();
+  }
   if (sidecar_ && !reader_.has("height") && !reader_.has("offset")) {
     scale_ = {sidecar_->high - sidecar_->low, white_is_deep_ ? sidecar_->high : sidecar_->low};
     reader_.write("height", scale_.amplitude);
@@ -304,6 +361,12 @@ Result<HeightMap> HeightSourceReader::build_between(double black, double white, 
 }
 
 Result<HeightMap> HeightSourceReader::image_heights(const HeightMapSettings& settings) const {
+  if (!floats_.values.empty()) {
+    Result<HeightMap> heights = float_heights(floats_, settings, !stored_metres_);
+    if (!heights) return std::move(heights).error().in_file(path_.string()).at(reader_.place_of(key_));
+    context_.note(fmt::format("{}: heights are read from the channel {} ({})", who_, floats_.channel, floats_.reason));
+    return heights;
+  }
   Result<HeightMap> heights = HeightMap::build(image_, channel_, settings);
   if (!heights) {
     Error error = std::move(heights).error().in_file(path_.string());
@@ -323,6 +386,14 @@ Result<HeightMap> HeightSourceReader::generated_heights(double amplitude, double
                                                         Reconstruction reconstruction) const {
   MesostructureSpec spec = spec_;
   // A formula's amplitude is not negative but where it is the height itself.
+  if (!library_.heights.empty()) {
+    const double scale = library_.amplitude > 0.0 ? amplitude / library_.amplitude : 0.0;
+    std::vector<float> heights = library_.heights;
+    for (float& height : heights) height = static_cast<float>(scale * static_cast<double>(height) + offset);
+    Result<HeightMap> map = HeightMap::build(std::move(heights), library_.size, library_.size, wrap, reconstruction);
+    if (!map) return std::move(map).error().at(reader_.place());
+    return map;
+  }
   const bool flipped = amplitude < 0.0 && spec.kind != MesostructureKind::flat;
   spec.amplitude = flipped ? -amplitude : amplitude;
   Result<std::vector<float>> heights = generate_heights(spec);

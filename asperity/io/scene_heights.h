@@ -8,6 +8,8 @@
 
 #include "asperity/field/height_map.h"
 #include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure_library.h"
+#include "asperity/io/image_io.h"
 #include "asperity/io/scene_reader.h"
 
 namespace asperity {
@@ -46,9 +48,16 @@ class HeightSourceReader {
   Result<HeightMap> build_between(double black, double white, Wrap wrap, Reconstruction reconstruction) const;
 
   [[nodiscard]] const std::optional<HeightSidecar>& sidecar() const { return sidecar_; }
+  /// Size of one repeat (m), where a sidecar or the library tells it.
+  [[nodiscard]] Vec2 tile() const {
+    return {sidecar_->pixel.x() * sidecar_->width, sidecar_->pixel.y() * sidecar_->height};
+  }
+  [[nodiscard]] bool from_library() const { return !library_.heights.empty(); }
 
  private:
   void read_generator(const SceneJson& json);
+  Status read_library(const SceneJson& json);
+  Status read_floats();
   Status read_image_source(const std::string& file);
   Status read_sidecar();
   [[nodiscard]] Result<double> height_of(const SceneJson& value, const std::string& place, const Range& range) const;
@@ -68,9 +77,12 @@ class HeightSourceReader {
   MesostructureSpec spec_;
   std::filesystem::path path_;
   Image image_;
+  FloatImage floats_;      ///< of an OpenEXR file, in place of the image
+  LibraryRelief library_;  ///< of the library, in place of a formula
   Channel channel_ = Channel::automatic;
   bool white_is_deep_ = false;
   std::optional<HeightSidecar> sidecar_;
+  bool stored_metres_ = false;  ///< floats are metres, not a range to be scaled
   double magnify_ = 1.0;
   HeightScale scale_;
 };

@@ -342,6 +342,22 @@ Vec2 ObjectReader::pair(std::string_view key, Dimension dimension, const Vec2& f
   return failed() ? fallback : answer;
 }
 
+Vec3 ObjectReader::vector(std::string_view key, Dimension dimension, const Vec3& fallback, double most) {
+  const SceneJson* value = raw(key);
+  Vec3 answer = fallback;
+  if (value != nullptr) {
+    if (!value->is_array() || value->size() != 3) {
+      fail_type(key, *value, "three quantities [x, y, z]");
+      return fallback;
+    }
+    for (std::size_t i = 0; i < 3; ++i)
+      answer[static_cast<int>(i)] =
+          value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), dimension, Range{-most, most});
+  }
+  write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
+  return failed() ? fallback : answer;
+}
+
 Vec3 ObjectReader::direction(std::string_view key, const Vec3& fallback) {
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;

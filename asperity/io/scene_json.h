@@ -77,7 +77,9 @@ class ObjectReader {
   Vec3 lengths(std::string_view key, const Vec3& fallback);
   /// One quantity for both, or two (SI, or texts with units).
   Vec2 pair(std::string_view key, Dimension dimension, const Vec2& fallback, const Range& range = {});
-  /// Three plain numbers.
+  /// Three quantities of a dimension (SI, or texts with units), each of at most `most`; all may be 0.
+  Vec3 vector(std::string_view key, Dimension dimension, const Vec3& fallback, double most);
+  /// Three plain numbers, not all 0.
   Vec3 direction(std::string_view key, const Vec3& fallback);
   /// The value as it stands, or nullptr.
   [[nodiscard]] const SceneJson* raw(std::string_view key) const;

@@ -6,7 +6,9 @@
 #include <array>
 
 #include "asperity/io/image_io.h"
+#include "asperity/io/scene_custom.h"
 #include "asperity/io/scene_reader.h"
+#include "asperity/render/custom_law.h"
 
 namespace asperity {
 namespace {
@@ -88,18 +90,20 @@ const std::vector<std::string>& magnitude_names() {
 void only(ObjectReader& reader, std::initializer_list<std::string_view> own, const std::string& who) {
   for (const std::string_view key :
        {"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius", "band", "largest_force",
-        "retarding", "reach", "magnitude", "depth_gain", "offset"}) {
+        "retarding", "reach", "magnitude", "depth_gain", "offset", "test_neighbours"}) {
     if (std::find(own.begin(), own.end(), key) == own.end()) reader.refuse({key}, who);
   }
 }
 
 Status read_mesostructure(ObjectReader& reader, const SceneContext& context, MesostructureLaw& law) {
-  only(reader, {"formulation", "rho", "blend"}, "by a mesostructure law");
+  only(reader, {"formulation", "rho", "blend", "test_neighbours"}, "by a mesostructure law");
   if (law.formulation == Formulation::consistent) {
-    reader.refuse({"rho", "blend"}, "by the consistent mesostructure law: the coat's \"stitching\" says how it blends");
+    reader.refuse({"rho", "blend", "test_neighbours"},
+                  "by the consistent mesostructure law: the coat's \"stitching\" says how it blends");
     return reader.status();
   }
   law.rho = reader.number("rho", law.rho, Range{0.0, 1.0 / 3.0, true});
+  law.test_neighbours = reader.boolean("test_neighbours", law.test_neighbours);
   return read_blend(reader, context, law.blend, law.blend_map);
 }
 
@@ -133,6 +137,7 @@ SceneJson blend_json(Blend blend, const std::vector<double>& weights) {
 }  // namespace
 
 SceneJson law_json(const Law& law) {
+  if (const CustomLaw* custom = custom_of(law)) return named_numbers_json(custom->name(), custom->numbers());
   SceneJson json = SceneJson::object();
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     json["type"] = "height-field";
@@ -144,6 +149,7 @@ SceneJson law_json(const Law& law) {
     if (meso->formulation == Formulation::literal) {
       json["rho"] = meso->rho;
       json["blend"] = blend_json(meso->blend, meso->blend_map);
+      json["test_neighbours"] = meso->test_neighbours;
     }
   } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
     json["type"] = "force-shading";
@@ -190,6 +196,19 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   }
   if (!json.is_object()) {
     return Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place, "a law's name or an object"};
+  }
+  if (json.contains("type") && json["type"].is_string()) {
+    // Its numbers are its own, and so is what is said of them.
+    const std::string name = json["type"].get<std::string>();
+    const std::vector<std::string>& own = custom_law_names();
+    if (std::find(own.begin(), own.end(), name) != own.end()) {
+      ASPERITY_TRY(NamedNumbers numbers, read_named_numbers(json, place));
+      Result<Law> law = make_custom_law(name, std::move(numbers));
+      if (!law) return std::move(law).error().at(place);
+      return ScenePart<Law>{*law, law_json(*law)};
+    }
+    // Before its keys: of a law that nobody knows they say nothing.
+    if (Result<Law> known = law_by_name(name); !known) return std::move(known).error().at(place + ".type");
   }
   ObjectReader reader(json, place, "law");
   const std::string type = reader.text("type", "proxy");
@@ -244,11 +263,17 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
 
 Result<Stitching> read_stitching(const SceneJson& json, const std::string& place, const SceneContext& context,
                                  ObjectReader& coat) {
-  static const std::vector<std::string> folds{"keep", "round"};
+  static const std::vector<std::string> folds{"keep", "round", "fillet"};
   ObjectReader reader(json, place, "stitching");
   Stitching stitching;
   stitching.folds = static_cast<FoldMode>(reader.choice("folds", folds, 0));
   stitching.rho = reader.number("rho", stitching.rho, Range{0.0, 1.0 / 3.0, true});
+  if (stitching.folds == FoldMode::fillet) {
+    stitching.fillet_radius =
+        reader.quantity("fillet_radius", Dimension::length, stitching.fillet_radius, Range::positive());
+  } else {
+    reader.refuse({"fillet_radius"}, "without \"folds\": \"fillet\"");
+  }
   ASPERITY_CHECK(read_blend(reader, context, stitching.blend, stitching.blend_map));
   if (auto valid = validate(stitching); !valid) return std::move(valid).error().at(place);
   coat.take("stitching", std::move(reader));

@@ -60,6 +60,7 @@ Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::str
 struct ProbeSettings {
   bool dynamic = false;
   double radius = 0.0;   ///< m
+  double tip = 0.0;      ///< m: of the ball whose path a point follows on coats with levels of detail
   double rate = 1000.0;  ///< Hz
   IdealProbeSettings ideal;
   SimulatedDeviceSettings simulated;
@@ -133,6 +134,13 @@ Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& plac
 
 /// One entry of `surfaces`. [build]
 Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context);
+
+/// Reads `motion` of a surface. [build]
+Result<Motion> read_motion(ObjectReader& surface);
+/// Reads the scene's `view`; `bounds` of the base meshes (m, world), for defaults. [build]
+Result<View> read_view(ObjectReader& root, const Box& bounds);
+/// Reads the scene's `change`. [build]
+Status read_change(ObjectReader& root, SceneSettings& settings);
 
 /// `bounds`: of the base meshes (m, world), for defaults and percentages. [build]
 Result<ScenePart<StrokeSettings>> read_stroke(const SceneJson* json, const std::string& place, const Box& bounds,

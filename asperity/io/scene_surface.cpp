@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/io/gltf_material.h"
+#include "asperity/io/scene_custom.h"
 #include "asperity/io/scene_fine.h"
+#include "asperity/io/scene_layers.h"
+#include "asperity/surface/closing.h"
 
 namespace asperity {
 namespace {
@@ -26,6 +30,11 @@ Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface,
   material.stiffness = reader.quantity("stiffness", Dimension::stiffness,
                                        std::min(preferred_stiffness, device.max_stiffness), Range::positive());
   material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
+  material.viscosity = reader.quantity("viscosity", Dimension::damping, 0.0, Range::not_negative());
+  material.magnetism = reader.quantity("magnetism", Dimension::stiffness, 0.0, Range::not_negative());
+  material.magnetic_band =
+      reader.quantity("magnetic_band", Dimension::length, material.magnetic_band, Range::positive());
+  material.stickiness = reader.quantity("stickiness", Dimension::force, 0.0, Range::not_negative());
   material.static_friction = reader.number("static_friction", 0.0, Range::not_negative());
   // Sliding holds less than sticking: without a number of its own, four fifths of it.
   material.dynamic_friction = reader.number("dynamic_friction", 0.8 * material.static_friction, Range::not_negative());
@@ -74,9 +83,65 @@ Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface,
   return Surface(std::make_shared<const ReliefSurface>(std::move(relief).value()));
 }
 
+/// Closes a relief as the coat's `closing` says. What the closed one cannot carry over is refused.
+Status close(Instance& instance, const SceneJson& json, const std::string& place, ObjectReader& coat,
+             SceneContext& context) {
+  ObjectReader reader(json, place, "closing");
+  ClosingSettings settings;
+  settings.radius = reader.quantity("radius", Dimension::length, settings.radius, Range::positive());
+  settings.texels = reader.integer("texels", 0, 0, 512);
+  ASPERITY_CHECK(reader.status());
+  const auto before = *std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  const ReliefSurface& relief = *before;
+  const Coat& worn = relief.coat();
+  const char* lost = worn.moves()                   ? "a layer that changes with time"
+                     : worn.materials() != nullptr  ? "maps of the material"
+                     : worn.levels() > 0            ? "levels of detail"
+                     : worn.maps().has_normal_map() ? "a normal map"
+                                                    : nullptr;
+  if (lost != nullptr) {
+    return Error{ErrorCode::mismatch,
+                 fmt::format("is baked into the heights alone, and the coat has {}", lost),
+                 {},
+                 place,
+                 "a coat of heights, or no closing"};
+  }
+  Result<ClosedRelief> baked = close_relief(relief, settings, context.progress);
+  if (!baked) return std::move(baked).error().at(place);
+  Result<ReliefSurface> wearing = wear_closed(relief, *baked);
+  if (!wearing) return std::move(wearing).error().at(place);
+  context.note(fmt::format("coat on \"{}\": {}", instance.name, baked->report.summary()));
+  coat.take("closing", std::move(reader));
+  instance.surface = std::make_shared<const ReliefSurface>(std::move(*wearing));
+  instance.closed_from = std::make_shared<const ClosedFrom>(ClosedFrom{before, std::move(*baked)});
+  return success();
+}
+
+/// The coat that the materials of a glTF file make. `json` may be nullptr.
+Result<ScenePart<Coat>> read_gltf_coat(const SceneJson* json, const std::string& place,
+                                       const std::filesystem::path& path, const MeshSource& source,
+                                       const TriangleMesh& mesh, const Material& own, double scale,
+                                       SceneContext& context) {
+  static const SceneJson by_default = SceneJson{{"from", "gltf"}};
+  ObjectReader reader(json != nullptr ? *json : by_default, place, "coat");
+  static const std::vector<std::string> sources{"gltf"};
+  reader.choice("from", sources, 0);
+  reader.refuse({"height_map", "channel", "height", "height_range", "offset", "white_is", "magnify", "tile", "repeat",
+                 "mapping", "wrap", "filter", "normal_map", "green", "normals", "detail", "layers", "maps"},
+                "beside \"from\": \"gltf\"");
+  Stitching stitching;
+  if (const SceneJson* given = reader.raw("stitching")) {
+    ASPERITY_TRY(stitching, read_stitching(*given, reader.place_of("stitching"), context, reader));
+  }
+  ASPERITY_CHECK(reader.status());
+  Result<Coat> coat = gltf_coat(path, source, mesh, own, stitching, scale, context);
+  if (!coat) return std::move(coat).error().at(place);
+  return ScenePart<Coat>{std::move(*coat), std::move(reader.canonical())};
+}
+
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
-Status read_triangles(ObjectReader& reader, const Law& law, SceneContext& context, Instance& instance,
-                      TexturePart& texture) {
+Status read_triangles(ObjectReader& reader, const Law& law, const Material& own, SceneContext& context,
+                      Instance& instance, TexturePart& texture) {
   static const std::vector<std::string> searches{"bvh", "octree"};
   reader.refuse({"iso"}, "without a volume");
   ASPERITY_CHECK(reader.status());
@@ -85,8 +150,18 @@ Status read_triangles(ObjectReader& reader, const Law& law, SceneContext& contex
   const auto search = reader.choice("search", searches, 0) == 0 ? SearchStructure::bvh : SearchStructure::octree;
   ASPERITY_CHECK(reader.status());
   if (context.progress) context.progress("building the search structure", 0.0);
-  ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), reader, context));
   const SceneJson* coat_json = reader.raw("coat");
+  const std::filesystem::path file =
+      part.from_file ? context.resolve(reader.raw("mesh")->get<std::string>()) : std::filesystem::path();
+  const bool says = coat_json != nullptr && coat_json->is_object() && coat_json->contains("from");
+  if (says && !is_gltf_path(file)) {
+    reader.fail("coat.from", "is \"gltf\", and the mesh is no glTF file", "a mesh that is one, or height_map");
+    return reader.status();
+  }
+  const bool gltf = says || (coat_json == nullptr && !reader.has("texture") && has_gltf_materials(file));
+  const MeshSource source = gltf ? part.source : MeshSource{};
+  const double scale = part.scale;
+  ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), reader, context));
   const TextureHost host{instance.name, mesh.bounds(), &mesh, nullptr, coat_json == nullptr ? "" : "a coated mesh"};
   ASPERITY_TRY(texture, read_texture(reader, host, law, context));
   std::shared_ptr<const Mesostructure> baked;
@@ -117,15 +192,24 @@ Status read_triangles(ObjectReader& reader, const Law& law, SceneContext& contex
                  build_relief(std::move(base), std::move(*coat), reader, context, instance.name, place));
     return success();
   }
-  if (coat_json == nullptr) {
+  if (coat_json == nullptr && !gltf) {
     reader.refuse({"on_overlap", "shell_directions"}, "without a coat");
     instance.surface = std::make_shared<const MeshSurface>(std::move(base));
     return reader.status();
   }
-  ASPERITY_TRY(ScenePart<Coat> coat, read_coat(*coat_json, reader.place_of("coat"), base.mesh(), context));
-  reader.write("coat", std::move(coat.canonical));
-  ASPERITY_TRY(instance.surface, build_relief(std::move(base), std::move(coat.value), reader, context, instance.name,
-                                              reader.place_of("coat")));
+  const std::string place = reader.place_of("coat");
+  Result<ScenePart<Coat>> coat = gltf ? read_gltf_coat(coat_json, place, file, source, base.mesh(), own, scale, context)
+                                      : read_coat(*coat_json, place, base.mesh(), context);
+  if (!coat) return std::move(coat).error();
+  ASPERITY_TRY(instance.surface,
+               build_relief(std::move(base), std::move(coat->value), reader, context, instance.name, place));
+  if (coat_json != nullptr && coat_json->contains("closing")) {
+    static const SceneJson empty = SceneJson::object();
+    ObjectReader shell(empty, place, "coat");
+    ASPERITY_CHECK(close(instance, (*coat_json)["closing"], place + ".closing", shell, context));
+    coat->canonical["closing"] = shell.canonical()["closing"];
+  }
+  reader.write("coat", std::move(coat->canonical));
   return success();
 }
 
@@ -207,22 +291,28 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
     ASPERITY_TRY(law, read_law(*given, reader.place_of("law"), context));
   }
   instance.law = law.value;
+  ASPERITY_TRY(MaterialPart material, read_material(reader.raw("material"), reader, context));
+  instance.material = material.material;
   TexturePart texture;
-  if (reader.has("implicit") && !reader.has("parametric")) {
+  if (reader.has("custom")) {
+    ASPERITY_CHECK(read_custom(reader, instance));
+    const TextureHost host{instance.name, surface_bounds(instance.surface), nullptr, nullptr, "a custom surface"};
+    ASPERITY_TRY(texture, read_texture(reader, host, instance.law, context));
+  } else if (reader.has("implicit") && !reader.has("parametric")) {
     // Read below.
   } else if (reader.has("parametric")) {
     ASPERITY_CHECK(read_parametric(reader, instance.law, context, instance, texture));
   } else if (reader.has("volume")) {
     ASPERITY_CHECK(read_isosurface(reader, context, instance));
   } else {
-    ASPERITY_CHECK(read_triangles(reader, instance.law, context, instance, texture));
+    ASPERITY_CHECK(read_triangles(reader, instance.law, instance.material, context, instance, texture));
   }
   ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
-  if (reader.has("parametric")) instance.world_from_object = upright(instance.world_from_object, read_up(reader, 2));
-  ASPERITY_TRY(MaterialPart material, read_material(reader.raw("material"), reader, context));
-  instance.material = material.material;
+  if (reader.has("parametric") || reader.has("custom"))
+    instance.world_from_object = upright(instance.world_from_object, read_up(reader, 2));
+  ASPERITY_TRY(instance.motion, read_motion(reader));
   reader.write("law", std::move(law.canonical));
-  if (reader.has("implicit")) {
+  if (reader.has("implicit") && !reader.has("custom")) {
     // Last: how far its potential is stored depends on how it is felt.
     const ImplicitFeel feel{instance.law, instance.material, context.probe_radius};
     ASPERITY_CHECK(read_implicit(reader, feel, context, instance));

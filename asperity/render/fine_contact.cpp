@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/render/coat_material.h"
+
 namespace asperity {
 
 namespace {
-
-const ReliefSurface* relief_of(const Instance& instance) noexcept {
-  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
-  return relief != nullptr ? relief->get() : nullptr;
-}
 
 /// Where the contact lies in the plane of the features.
 void place_contact(const Instance& instance, std::uint32_t element, const Vec3& point, const Hint& hint,
@@ -110,21 +107,22 @@ TextureSample sample_features(const FineFeatures& fine, const MappedPlaces& plac
 /// The coat of a mesh that is felt as its bare base: heights as they are blended over its edges, or the slope that its
 /// normal map draws.
 TextureSample sample_coat(const ReliefSurface& relief, Formulation formulation, std::uint32_t element,
-                          const Vec3& point, ReliefFrame& cached) noexcept {
+                          const Vec3& point, Hint& hint) noexcept {
+  ReliefFrame& cached = hint.relief.frame;
   TextureSample out;
   const TriangleMesh& mesh = relief.base().mesh();
   if (element >= mesh.triangles().size()) return out;
   const BarycentricFrame frame = barycentric_frame(mesh, element);
   const Vec3 place = frame.coordinates(point);
   if (formulation == Formulation::literal) {
-    const CoatSample coat = relief.coat().sample(mesh, element, place);
+    const CoatSample coat = relief.coat_sample(element, place, hint.moment);
     constexpr double least_rise = 0.1;  // a normal that lies flat has no slope
     const double rise = std::max(least_rise, coat.normal.dot(frame.normal));
     out.height = coat.height;
     out.gradient = -(coat.normal - coat.normal.dot(frame.normal) * frame.normal) / rise;
     return out;
   }
-  if (cached.owner != relief.base().index().identity() || cached.face != element) cached = relief.frame(element);
+  if (!relief.holds(cached, element, hint.moment)) cached = relief.frame(element, hint.moment);
   const HeightJet jet = relief.height(cached, place[1], place[2]);
   out.height = jet.height;
   out.gradient = jet.u * frame.gradient[1] + jet.v * frame.gradient[2];
@@ -224,6 +222,13 @@ bool add_relief_texture(const TextureSample& texture, double highest, double sti
   return true;
 }
 
+/// The relief whose coat says which way friction is least, or nullptr.
+const ReliefSurface* lay_of(const Instance& instance) noexcept {
+  const ReliefSurface* relief = relief_of(instance);
+  const MaterialMaps* maps = relief != nullptr ? relief->coat().materials() : nullptr;
+  return maps != nullptr && maps->has_lay() ? relief : nullptr;
+}
+
 /// Coefficients of a place, and across which direction they are largest.
 void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal, TextureState& state,
                     FrictionCoefficients& coefficients) noexcept {
@@ -278,6 +283,16 @@ void add_friction(const Instance& instance, const Material& material, double sti
   coefficients.sliding = material.dynamic_friction;
   if (const FineFeatures* fine = instance.fine.get(); fine != nullptr && fine->shapes_friction() && !places.empty())
     shape_friction(*fine, places, law.normal, slot.texture, coefficients);
+  if (const ReliefSurface* relief = lay_of(instance)) {
+    double strength = 0.0;
+    const Vec3 along = mapped_lay(*relief, coat_place(instance, *relief, law.point, slot.hint), strength);
+    const Vec3 across = law.normal.cross(along);
+    const double length = across.norm();
+    if (strength > 0.0 && length > 0.0) {
+      coefficients.across = across / length;
+      coefficients.still_ratio = coefficients.sliding_ratio = 1.0 - strength;
+    }
+  }
   const double before = friction_energy(slot.friction);
   const Vec3 force = friction_force(material.friction, contact, slot.friction);
   law.held = friction_energy(slot.friction);
@@ -306,6 +321,7 @@ void let_go(ContactState& slot) noexcept {
 bool proxy_holds_friction(const Instance& instance) noexcept {
   if (!std::holds_alternative<ProxyLaw>(instance.law)) return false;
   if (instance.fine != nullptr && (instance.fine->has_texture() || instance.fine->shapes_friction())) return false;
+  if (lay_of(instance) != nullptr) return false;
   const FrictionLaw& law = instance.material.friction;
   return law.kind == FrictionKind::implicit_coulomb && law.stiffness == 0.0 && law.damping == 0.0 &&
          law.break_away == 0.0;
@@ -336,7 +352,7 @@ bool add_fine_forces(const Instance& instance, const Material& material, bool fr
       TextureSample texture;
       double highest = fine->highest();
       if (from_coat && relief != nullptr) {
-        texture = sample_coat(*relief, settings.formulation, law.element, law.point, slot.hint.relief.frame);
+        texture = sample_coat(*relief, settings.formulation, law.element, law.point, slot.hint);
         highest = relief->coat().highest();
         if (from_behind(*relief, law.element, law.normal)) {
           texture = {-texture.height, -texture.gradient, texture.faded};
@@ -369,8 +385,9 @@ TextureShape texture_at(const Instance& instance, std::uint32_t element, const V
   double highest = instance.fine->highest();
   const ReliefSurface* relief = relief_of(instance);
   if (settings.source == TextureSource::coat && relief != nullptr) {
-    ReliefFrame frame;
-    texture = sample_coat(*relief, settings.formulation, element, point, frame);
+    Hint own;
+    own.moment = hint.moment;
+    texture = sample_coat(*relief, settings.formulation, element, point, own);
     highest = relief->coat().highest();
     if (from_behind(*relief, element, normal)) {
       texture = {-texture.height, -texture.gradient, texture.faded};

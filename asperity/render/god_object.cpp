@@ -31,7 +31,7 @@ Vec3 shading_normal(const Instance& instance, const Foot& contact) noexcept {
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) {
     const bool given = (*relief)->coat().maps_on(contact.element).has_normal_map();
     normal = blended && !given ? blended_normal(**relief, contact)
-                               : (*relief)->coat().sample(mesh.mesh(), contact.element, contact.barycentric).normal;
+                               : (*relief)->coat_sample(contact.element, contact.barycentric).normal;
   } else {
     normal = interpolated_normal(mesh.mesh(), contact.element, contact.barycentric);
   }
@@ -41,14 +41,14 @@ Vec3 shading_normal(const Instance& instance, const Foot& contact) noexcept {
 void MeshConstraints::add(const Instance& instance, ContactState& state) noexcept {
   if (entries_.size() == capacity) return;
   const ConstraintGeometry mesh = patches_.of(instance);
-  entries_.push_back({&instance, mesh, &state, instance.world_from_object.is_identity()});
+  entries_.push_back({&instance, mesh, &state, state.pose.is_identity()});
   tolerance_ = std::min(tolerance_, tolerance_of_skin * mesh.skin());
 }
 
 void MeshConstraints::contacts(const Vec3& position, PlaneSet& out) noexcept {
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
-    const Pose& pose = entry.instance->world_from_object;
+    const Pose& pose = entry.state->pose;
     ContactSet touched;
     entry.mesh.contacts(entry.at_origin ? position : pose.apply_inverse(position), radius_, entry.instance->sides,
                         entry.state->hint, touched);
@@ -63,7 +63,7 @@ void MeshConstraints::contacts(const Vec3& position, PlaneSet& out) noexcept {
 double MeshConstraints::sweep(const Segment& motion) noexcept {
   double first = 1.0;
   for (Entry& entry : entries_) {
-    const Pose& pose = entry.instance->world_from_object;
+    const Pose& pose = entry.state->pose;
     const Segment local =
         entry.at_origin ? motion : Segment{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
     first = std::min(first, entry.mesh.segment(local, radius_, entry.instance->sides, entry.state->hint).t);
@@ -71,7 +71,7 @@ double MeshConstraints::sweep(const Segment& motion) noexcept {
   return first;
 }
 
-LawForce owner_force(const Instance& instance, const Material& material, std::size_t owner,
+LawForce owner_force(const Instance& instance, const Material& material, const Pose& pose, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
   LawForce answer;
   Vec3 spring = Vec3::Zero();
@@ -87,7 +87,6 @@ LawForce owner_force(const Instance& instance, const Material& material, std::si
     plane = &solution.planes[active.plane];
   }
   if (plane == nullptr) return answer;
-  const Pose& pose = instance.world_from_object;
   answer.contact = true;
   answer.penetration = spring.norm();
   answer.normal = spring / answer.penetration;

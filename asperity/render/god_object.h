@@ -14,7 +14,7 @@ Vec3 shading_normal(const Instance& instance, const Foot& contact) noexcept;
 /// Force of one owner among solved planes, world frame: its share of the spring from `goal`, and, for the owner that
 /// pushes most, what friction holds (from the goal on to the probe); shaded and damped as its law and material say.
 /// [servo]
-LawForce owner_force(const Instance& instance, const Material& material, std::size_t owner,
+LawForce owner_force(const Instance& instance, const Material& material, const Pose& pose, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept;
 
 /// The instances that constrain the proxy this tick, in the world frame. [servo]
@@ -44,7 +44,7 @@ class MeshConstraints {
   }
   [[nodiscard]] Vec3 foot(const ConstraintPlane& plane) const noexcept {
     const Entry& entry = entries_[plane.owner];
-    return entry.at_origin ? plane.contact.point : entry.instance->world_from_object.apply(plane.contact.point);
+    return entry.at_origin ? plane.contact.point : entry.state->pose.apply(plane.contact.point);
   }
 
   [[nodiscard]] const Instance& instance(std::size_t index) const noexcept { return *entries_[index].instance; }

@@ -34,8 +34,8 @@ Taper edge_taper(double width, const Vec3& barycentric) noexcept {
 
 /// As printed: among the prisms that hold the probe, the one whose height field it is deepest under (2005: "the
 /// algorithm compares the heights in the textures of both triangles").
-LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness,
-                       const Vec3& probe) noexcept {
+LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe,
+                       const CoatMoment& moment) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
   LawForce answer;
@@ -46,7 +46,7 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
     const BarycentricFrame frame = barycentric_frame(mesh, face);
     const Vec3 barycentric = frame.coordinates(probe);
     const double height =
-        edge_taper(law.edge_taper, barycentric).factor * surface.coat().sample(mesh, face, barycentric).height;
+        edge_taper(law.edge_taper, barycentric).factor * surface.coat_sample(face, barycentric, moment).height;
     const double penetration = height - std::abs(frame.height(probe));
     const bool deeper =
         penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
@@ -87,8 +87,9 @@ LawForce consistent_force(const HeightFieldLaw& law, const ReliefSurface& surfac
 
 LawForce height_field_force(const HeightFieldLaw& law, const ReliefSurface& surface, const Material& material,
                             const Vec3& probe, ContactState& state) noexcept {
-  return law.formulation == Formulation::literal ? literal_force(law, surface, material.stiffness, probe)
-                                                 : consistent_force(law, surface, material.stiffness, probe, state);
+  return law.formulation == Formulation::literal
+             ? literal_force(law, surface, material.stiffness, probe, state.hint.moment)
+             : consistent_force(law, surface, material.stiffness, probe, state);
 }
 
 ShellContact shell_contact(const ReliefSurface& surface, const Vec3& probe, Hint& hint) noexcept {

@@ -39,7 +39,7 @@ double JointProxy::gap(const Entry& entry) const noexcept {
 bool JointProxy::foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane,
                             double& distance) noexcept {
   const Entry& entry = entries_[index];
-  const Pose& pose = entry.instance->world_from_object;
+  const Pose& pose = entry.state->pose;
   const Vec3 local = pose.apply_inverse(position);
   Vec3 front = Vec3::Zero();
   const Foot foot =
@@ -79,7 +79,7 @@ void JointProxy::touched(const Vec3& position, PlaneSet& out) noexcept {
       if (!entry.smooth.has_folds()) out.push_back(plane);
       continue;
     }
-    const Pose& pose = entry.instance->world_from_object;
+    const Pose& pose = entry.state->pose;
     ContactSet contacts;
     entry.mesh.contacts(pose.apply_inverse(position), radius_ + margin_, entry.instance->sides, entry.state->hint,
                         contacts);
@@ -96,7 +96,7 @@ void JointProxy::touched(const Vec3& position, PlaneSet& out) noexcept {
       known = known || (other.owner == plane.owner && other.normal == plane.normal);
     if (known) continue;
     const double apart = plane.normal.dot(position) - plane.offset - plane.skin;
-    const Vec3 foot = entries_[plane.owner].instance->world_from_object.apply(plane.contact.point);
+    const Vec3 foot = entries_[plane.owner].state->pose.apply(plane.contact.point);
     // Feet found on the way stay as long as the ball is about as near to them as their surface bends.
     const double around = radius_ + plane.skin;
     if (apart > 0.1 * around || (position - foot).squaredNorm() > 2.0 * around * around) {
@@ -111,13 +111,14 @@ double JointProxy::free_share(const Segment& motion) noexcept {
   double share = 1.0;
   const double length = (motion.to - motion.from).norm();
   for (Entry& entry : entries_) {
-    const Pose& pose = entry.instance->world_from_object;
+    const Pose& pose = entry.state->pose;
     const Segment local{pose.apply_inverse(motion.from), pose.apply_inverse(motion.to)};
     if (!entry.smooth) {
       share = std::min(share, entry.mesh.segment(local, radius_ + margin_, entry.instance->sides, entry.state->hint).t);
       continue;
     }
     Hint scratch;
+    scratch.moment = entry.state->hint.moment;
     const SweptHit hit = entry.smooth.segment(local, entry.instance->sides, scratch);
     // The centre itself must stay outside: half of the ball before what it meets.
     if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin_) / length));

@@ -20,6 +20,7 @@ struct LawForce {
   double push = 0.0;             ///< N along the normal, before damping: what friction and texture go by
   Vec3 friction = Vec3::Zero();  ///< N, the part of the force that is friction
   Vec3 texture = Vec3::Zero();   ///< N, the part that is texture
+  bool pulls = false;            ///< a sticky surface holds the probe back: `penetration` is how far it was drawn off
   double held = 0.0;             ///< J, in the spring of a friction law
   Vec3 turn = Vec3::Zero();      ///< N, lateral force of consistent shading, to be added as far as its budget lets it
   bool bends = false;            ///< `bend` is known

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asperity/core/suggest.h"
+#include "asperity/render/custom_law.h"
 
 namespace asperity {
 
@@ -78,6 +79,7 @@ std::string law_name(const Law& law) {
           [&](const VirtualContactPointLaw& l) { return "virtual-contact-point" + suffix(l.formulation); },
           [&](const MagneticLaw& l) { return "magnetic" + suffix(l.formulation); },
           [](const NormalPerturbationLaw&) { return std::string("normal-perturbation"); },
+          [](const std::shared_ptr<const CustomLaw>& l) { return l == nullptr ? std::string("custom") : l->name(); },
       },
       law);
 }
@@ -127,9 +129,12 @@ Result<Law> law_by_name(std::string_view name) {
   if (name == "magnetic") return Law(MagneticLaw{});
   if (name == "magnetic-literal") return Law(MagneticLaw{Formulation::literal});
   if (name == "normal-perturbation") return Law(NormalPerturbationLaw{});
+  std::vector<std::string> all = law_names();
+  all.insert(all.end(), custom_law_names().begin(), custom_law_names().end());
+  if (std::find(all.begin(), all.end(), name) != all.end()) return make_custom_law(name, {});
   std::string list;
-  for (const std::string& known : law_names()) list += (list.empty() ? "" : ", ") + known;
-  const std::string near = nearest_name(name, law_names());
+  for (const std::string& known : all) list += (list.empty() ? "" : ", ") + known;
+  const std::string near = nearest_name(name, all);
   return Error{ErrorCode::bad_value,
                fmt::format("\"{}\" is no law{}", name, near.empty() ? "" : "; did you mean \"" + near + "\"?"),
                {},
@@ -138,6 +143,8 @@ Result<Law> law_by_name(std::string_view name) {
 }
 
 Status validate(const Law& law) {
+  if (std::holds_alternative<std::shared_ptr<const CustomLaw>>(law) && custom_of(law) == nullptr)
+    return Error{ErrorCode::bad_value, "holds no law", {}, {}, "a law made by CustomLaw::build"};
   if (const auto* avila = std::get_if<AvilaLaw>(&law)) return validate_avila(*avila);
   if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) return validate_cross_uncross(*cross);
   if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) return validate_virtual_contact_point(*contact);
@@ -158,12 +165,13 @@ Status validate(const Law& law) {
     return option_error("subdivisions", dense->subdivisions, "1 or more, or 0 to choose them by the texels");
   if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
     const MesostructureLaw plain;
-    const bool given = meso->rho != plain.rho || meso->blend != plain.blend || !meso->blend_map.empty();
+    const bool given =
+        meso->rho != plain.rho || meso->blend != plain.blend || !meso->blend_map.empty() || meso->test_neighbours;
     if (meso->formulation == Formulation::consistent && given) {
       return Error{ErrorCode::bad_value,
                    "is the literal form's: the consistent one blends as the coat's stitching says",
                    {},
-                   meso->rho != plain.rho ? "rho" : "blend",
+                   meso->test_neighbours ? "test_neighbours" : (meso->rho != plain.rho ? "rho" : "blend"),
                    "coat.stitching, or formulation \"literal\""};
     }
     return validate(Stitching{FoldMode::keep, meso->blend, meso->rho, meso->blend_map});

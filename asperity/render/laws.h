@@ -1,6 +1,7 @@
 #pragma once
 // How a surface is felt: the settings of the contact laws. One source file per method holds what they do.
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -57,6 +58,9 @@ struct MesostructureLaw {
   double rho = 0.05;              ///< literal: width of the band in barycentric coordinates, above 0, at most 1/3
   Blend blend = Blend::s_shape;   ///< literal: weights over the band
   std::vector<double> blend_map;  ///< literal, Blend::image: weights at t = 0 … 1, evenly spaced, at least two
+  /// literal: the blend on the fly of section 4.2. Within the band around any edge heights and normals are averaged
+  /// over every neighbouring prism that holds the probe.
+  bool test_neighbours = false;
 };
 
 /// God-object on geometry generated per triangle at run time inside the probe's influence area (haptic-textures-2005,
@@ -141,17 +145,20 @@ struct MagneticLaw {
 /// texture's height there, and longer by that height. Force and direction jump where the nearest face changes.
 struct NormalPerturbationLaw {};
 
-using Law =
-    std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw, GeneratedGeometryLaw,
-                 DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw, MagneticLaw, NormalPerturbationLaw>;
+/// A law that a program has added (asperity/render/custom_law.h).
+class CustomLaw;
+
+using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw,
+                         GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw,
+                         MagneticLaw, NormalPerturbationLaw, std::shared_ptr<const CustomLaw>>;
 
 /// "proxy", "god-object", "force-shading", "height-field", "mesostructure", the last two with "-literal" appended where
 /// it is, "generated-geometry", "dense-mesh", "avila", "cross-uncross", "virtual-contact-point", "magnetic" (and
-/// "-literal"), "normal-perturbation". [any]
+/// "-literal"), "normal-perturbation"; a program's own law by the name that it was given. [any]
 std::string law_name(const Law& law);
-/// The law of that name with default options. Errors: bad_value listing the names. [any]
+/// The law of that name with default options, built in or registered. Errors: bad_value listing the names. [any]
 Result<Law> law_by_name(std::string_view name);
-/// Every name that law_by_name accepts. [any]
+/// Every built-in name that law_by_name accepts. [any]
 const std::vector<std::string>& law_names();
 /// Errors: bad_value naming the option and what would be accepted. [build]
 Status validate(const Law& law);
@@ -165,6 +172,12 @@ constexpr bool needs_field(const Law& law) noexcept {
 constexpr bool needs_potential(const Law& law) noexcept {
   return std::holds_alternative<VirtualContactPointLaw>(law) || std::holds_alternative<MagneticLaw>(law) ||
          std::holds_alternative<NormalPerturbationLaw>(law);
+}
+
+/// The law that a program has added, or nullptr. [any]
+inline const CustomLaw* custom_of(const Law& law) noexcept {
+  const auto* custom = std::get_if<std::shared_ptr<const CustomLaw>>(&law);
+  return custom != nullptr ? custom->get() : nullptr;
 }
 
 /// Whether the law takes part in the joint constraint solve (it moves the proxy) rather than adding a force of its own.

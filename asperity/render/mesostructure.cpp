@@ -31,11 +31,11 @@ double face_weight(const MesostructureLaw& law, const Vec3& barycentric) noexcep
   return weight;
 }
 
-/// Lines 4 to 34 as printed, with three liberties that the text leaves no way around: the weight function (undefined
-/// there), the normals turned from each face's tangent frame into the object's, and of several prisms the one whose
-/// plane is nearest.
-LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness,
-                       const Vec3& probe) noexcept {
+/// Lines 4 to 34 as printed, or with the band and the inclusion test of section 4.2, with three liberties that the text
+/// leaves no way around: the weight function (undefined there), the normals turned from each face's tangent frame into
+/// the object's, and of several prisms the one whose plane is nearest.
+LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe,
+                       const CoatMoment& moment) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
   std::uint32_t owner = no_index;
@@ -53,19 +53,21 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
   LawForce answer;
   if (owner == no_index) return answer;
   const Vec3 barycentric = barycentric_frame(mesh, owner).coordinates(probe);
-  const CoatSample own = surface.coat().sample(mesh, owner, barycentric);
+  const CoatSample own = surface.coat_sample(owner, barycentric, moment);
   double height = own.height;
   Vec3 normal = own.normal;
-  if (barycentric.maxCoeff() >= 1.0 - law.rho) {
+  const bool in_band = law.test_neighbours ? barycentric.minCoeff() < law.rho : barycentric.maxCoeff() >= 1.0 - law.rho;
+  if (in_band) {
     double total = 0.0;
     double height_sum = 0.0;
     Vec3 normal_sum = Vec3::Zero();
     for_each_adjoining_face(mesh, owner, [&](std::uint32_t face) {
+      if (law.test_neighbours && face != owner && !prisms.contains(face, probe)) return;
       const BarycentricFrame frame = barycentric_frame(mesh, face);
       const Vec3 coordinates = frame.coordinates(probe);
       const double weight = face_weight(law, coordinates);
       if (weight <= 0.0) return;
-      const CoatSample sample = surface.coat().sample(mesh, face, coordinates);
+      const CoatSample sample = surface.coat_sample(face, coordinates, moment);
       height_sum += weight * sample.height;
       normal_sum += weight * sample.normal;
       total += weight;
@@ -101,8 +103,9 @@ LawForce consistent_force(const ReliefSurface& surface, double stiffness, const 
 
 LawForce mesostructure_force(const MesostructureLaw& law, const ReliefSurface& surface, const Material& material,
                              const Vec3& probe, ContactState& state) noexcept {
-  return law.formulation == Formulation::literal ? literal_force(law, surface, material.stiffness, probe)
-                                                 : consistent_force(surface, material.stiffness, probe, state);
+  return law.formulation == Formulation::literal
+             ? literal_force(law, surface, material.stiffness, probe, state.hint.moment)
+             : consistent_force(surface, material.stiffness, probe, state);
 }
 
 }  // namespace asperity

@@ -18,7 +18,7 @@ class ReliefProxy {
       : surface_(surface), sides_(sides), friction_(friction), position_(from), probe_(probe), state_(state) {}
 
   ProxyRest run() noexcept {
-    const bool held = state_.touching && state_.hint.relief.frame.owner == surface_.base().index().identity();
+    const bool held = state_.touching && state_.hint.relief.frame.owner == surface_.identity();
     if (!held) {
       state_.touching = false;
       state_.sliding = false;
@@ -29,6 +29,11 @@ class ReliefProxy {
     for (int flight = 0; flight < most_flights; ++flight) {
       const DescentEnd end = settle();
       if (end != DescentEnd::left && end != DescentEnd::rim) return resting(end != DescentEnd::limited);
+      if (end == DescentEnd::left && friction_.grip > 0.0 && holds_on()) {
+        ProxyRest rest = resting(true);
+        rest.pulls = true;
+        return rest;
+      }
       if (!fly(state_.point.position + state_.side * surface_.skin() * state_.point.normal())) return free();
     }
     return resting(false);
@@ -48,6 +53,20 @@ class ReliefProxy {
     state_.side = hit.contact.normal.dot(state_.point.normal()) >= 0.0 ? 1.0 : -1.0;
     state_.touching = true;
     return true;
+  }
+
+  /// Goes to the surface's point nearest to a probe that is drawn off it; false where that is too far to hold.
+  bool holds_on() noexcept {
+    Descent descent;
+    descent.place = &state_.hint.relief;
+    descent.goal = probe_;
+    descent.side = state_.side;
+    descent.may_leave = false;
+    descent.point = state_.point;
+    descend(surface_, descent);
+    state_.point = descent.point;
+    state_.sliding = false;
+    return (state_.point.position - probe_).norm() <= friction_.grip;
   }
 
   ProxyRest free() noexcept {
@@ -77,6 +96,7 @@ class ReliefProxy {
       const double skin = surface_.skin();
       const Segment moved{point.position + side * skin * point.normal(), state_.point.position + skin * normal()};
       Hint other;
+      other.moment = state_.hint.moment;
       const SweptHit hit = surface_.segment_elsewhere(moved, sides_, before, after, other);
       if (!hit.hit) return end;
       // Another fold was in the way: the proxy goes on from there, on that one, if it is nearer there.
@@ -140,8 +160,9 @@ class ReliefProxy {
 }  // namespace
 
 Friction friction_of(const Instance& instance, const Material& material) noexcept {
-  if (!proxy_holds_friction(instance)) return {};
-  return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction};
+  const double grip = material.stickiness / material.stiffness;
+  if (!proxy_holds_friction(instance)) return {0.0, 0.0, grip};
+  return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction, grip};
 }
 
 ProxyRest solve_on_relief(const ReliefSurface& surface, Sides sides, const Friction& friction, const Vec3& from,

@@ -10,8 +10,9 @@ namespace asperity {
 struct Friction {
   double still = 0.0;
   double sliding = 0.0;
+  double grip = 0.0;  ///< m: how far off a sticky surface the probe may be drawn before it lets go
 };
-/// A material's coefficients; none unless the proxy itself holds the friction. [servo]
+/// A material's coefficients, and its grip; no coefficients unless the proxy itself holds the friction. [servo]
 Friction friction_of(const Instance& instance, const Material& material) noexcept;
 
 /// Where the proxy of a point came to rest.
@@ -21,6 +22,7 @@ struct ProxyRest {
   bool converged = true;
   Vec3 proxy = Vec3::Zero();   ///< m
   Vec3 normal = Vec3::Zero();  ///< unit, on the side touched
+  bool pulls = false;          ///< the probe is outside, and a sticky surface holds on to it
 };
 
 /// One tick on one relief, object frame: from the state's place, or from `from` through free space, towards `probe`.

@@ -36,10 +36,14 @@ const ParametricSurface* proxied_parametric(const Instance& instance) noexcept {
   return std::holds_alternative<ProxyLaw>(instance.law) ? parametric_of(instance.surface) : nullptr;
 }
 
+const CustomSurface* proxied_custom(const Instance& instance) noexcept {
+  return std::holds_alternative<ProxyLaw>(instance.law) ? custom_of(instance.surface) : nullptr;
+}
+
 /// Whether the proxy's law goes by a smooth surface rather than by triangles.
 bool smooth(const Instance& instance) noexcept {
   return proxied_relief(instance) != nullptr || proxied_parametric(instance) != nullptr ||
-         proxied_iso(instance) != nullptr;
+         proxied_iso(instance) != nullptr || proxied_custom(instance) != nullptr;
 }
 
 /// The point of one smooth surface, object frame. `jet`: of a parametric surface, where it rests.
@@ -84,14 +88,14 @@ void set_bend(const Mat3& bend, const Pose& pose, LawForce& law) noexcept {
 /// One smooth surface, touched by a point, or by a ball where the surface has one level further out for it.
 ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& from, const ProbeSample& probe,
                       double radius) noexcept {
-  const Pose& pose = instance.world_from_object;
+  const Pose& pose = slot.pose;
   const bool at_origin = pose.is_identity();
   const Vec3& position = probe.pose.position;
   const Vec3 local_from = at_origin ? from : pose.apply_inverse(from);
   const Vec3 local_probe = at_origin ? position : pose.apply_inverse(position);
   // Friction is that of the place where the proxy rests.
   const Vec3& place = slot.touching ? slot.iso.point : local_from;
-  const Friction friction = friction_of(instance, local_material(instance, place, slot.hint.sparse));
+  const Friction friction = friction_of(instance, local_material(instance, place, slot.hint));
   ParametricJet jet;
   const ProxyRest rest = solve_on_smooth(instance, friction, local_from, local_probe, slot, jet);
   ProxyAnswer answer;
@@ -100,14 +104,16 @@ ProxyAnswer on_smooth(const Instance& instance, ContactState& slot, const Vec3& 
   LawForce law;
   Material material = instance.material;
   if (rest.contact) {
-    material = local_material(instance, rest.proxy - radius * rest.normal, slot.hint.sparse);
+    material = local_material(instance, rest.proxy - radius * rest.normal, slot.hint);
     law.contact = true;
     answer.proxy = at_origin ? rest.proxy : pose.apply(rest.proxy);
     law.normal = at_origin ? rest.normal : pose.rotate(rest.normal);
     const Vec3 spring = answer.proxy - position;
     law.penetration = spring.norm();
-    law.force = with_damping(on_cone(material.stiffness * spring, law.normal, friction, slot.sliding), law.normal,
-                             probe.twist.linear, material.damping);
+    law.pulls = rest.pulls;
+    law.force = rest.pulls ? Vec3(material.stiffness * spring)
+                           : with_damping(on_cone(material.stiffness * spring, law.normal, friction, slot.sliding),
+                                          law.normal, probe.twist.linear, material.damping);
     law.point = answer.proxy - radius * law.normal;
     if (proxied_relief(instance) != nullptr) {
       law.height = slot.point.jet.height;
@@ -247,7 +253,8 @@ void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, Prox
       const double paid = state.tank.pay(would - may);
       if (paid < would - may) {
         const double share = (may + paid) / would;
-        stiffness *= share;
+        // Never all of it: a spring that is still held is not a free one.
+        stiffness *= std::max(share, 1e-12);
         answer.energy_limited = true;
         answer.rendered_share = share;
         for (ProxyAnswer::Part& part : answer.parts) part.law.force *= share;
@@ -267,7 +274,7 @@ Vec3 off_the_surface(const Instance& instance, const ContactState& slot) noexcep
   const double skin = relief != nullptr       ? relief->skin()
                       : parametric != nullptr ? parametric->skin()
                                               : proxied_iso(instance)->skin();
-  return 2.0 * skin * instance.world_from_object.rotate(normal);
+  return 2.0 * skin * slot.pose.rotate(normal);
 }
 
 }  // namespace
@@ -279,7 +286,7 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
   ContactState* smooth_slot = nullptr;
   std::size_t constrained = 0;
   for (ContactState& slot : state.contacts) {
-    const Instance& instance = scene.instances()[slot.instance];
+    const Instance& instance = scene.felt()[slot.instance];
     if (!constrains(instance.law)) continue;
     ++constrained;
     if (smooth(instance)) smooth_slot = &slot;
@@ -298,9 +305,9 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
     answer.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
     for (std::size_t i = 0; i < solver.size(); ++i) {
       const Instance& instance = solver.instance(i);
-      const Material material = local_material(instance, instance.world_from_object.apply_inverse(solution.proxy),
-                                               solver.state(i).hint.sparse);
-      LawForce law = owner_force(instance, material, i, solution, goal, probe);
+      const Material material =
+          local_material(instance, solver.state(i).pose.apply_inverse(solution.proxy), solver.state(i).hint);
+      LawForce law = owner_force(instance, material, solver.state(i).pose, i, solution, goal, probe);
       if (std::holds_alternative<ForceShadingLaw>(instance.law))
         add_turn(solver.state(i), law, position - state.previous_probe);
       answer.parts.push_back({solver.state(i).instance, law, material.stiffness});
@@ -308,13 +315,13 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
   };
   const auto friction_in = [&](auto& solver, std::uint32_t owner) {
     const Instance& instance = solver.instance(owner);
-    const Vec3 place = instance.world_from_object.apply_inverse(before);
-    return friction_of(instance, local_material(instance, place, solver.state(owner).hint.sparse));
+    const Vec3 place = solver.state(owner).pose.apply_inverse(before);
+    return friction_of(instance, local_material(instance, place, solver.state(owner).hint));
   };
   if (smooth_slot == nullptr) {
     MeshConstraints constraints(scene.probe_radius());
     for (ContactState& slot : state.contacts) {
-      if (constrains(scene.instances()[slot.instance].law)) constraints.add(scene.instances()[slot.instance], slot);
+      if (constrains(scene.felt()[slot.instance].law)) constraints.add(scene.felt()[slot.instance], slot);
     }
     Vec3 goal;
     const ConstraintSolution solution = solve_with_friction(
@@ -323,17 +330,18 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
         [&](const Vec3& from, const Vec3& to) { return solve_constraints(constraints, from, to); },
         [&](std::uint32_t owner) { return friction_in(constraints, owner); });
     gather(constraints, solution, goal);
-  } else if (constrained == 1 &&
-             (scene.probe_radius() == 0.0 || ball_level(scene.instances()[smooth_slot->instance], scene) > 0.0)) {
-    answer = on_smooth(scene.instances()[smooth_slot->instance], *smooth_slot, before, probe, scene.probe_radius());
+  } else if (constrained == 1 && proxied_custom(scene.felt()[smooth_slot->instance]) == nullptr &&
+             (scene.probe_radius() == 0.0 || ball_level(scene.felt()[smooth_slot->instance], scene) > 0.0)) {
+    answer = on_smooth(scene.felt()[smooth_slot->instance], *smooth_slot, before, probe, scene.probe_radius());
   } else {
     JointProxy joint(scene.probe_radius());
     Vec3 from = before;
     for (ContactState& slot : state.contacts) {
-      const Instance& instance = scene.instances()[slot.instance];
+      const Instance& instance = scene.felt()[slot.instance];
       if (!constrains(instance.law)) continue;
       joint.add(instance, slot);
-      if (slot.touching && smooth(instance)) from += off_the_surface(instance, slot);
+      if (slot.touching && smooth(instance) && proxied_custom(instance) == nullptr)
+        from += off_the_surface(instance, slot);
       slot.touching = false;
     }
     bool clear = false;
@@ -349,56 +357,68 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
   return answer;
 }
 
+Vec3 pushed_to_front(const Scene& scene, const Instance& instance, bool front_side, ContactState& slot,
+                     const Vec3& proxy) noexcept {
+  const Pose& pose = slot.pose;
+  const Vec3 local = pose.apply_inverse(proxy);
+  Vec3 front;
+  Foot foot;
+  double skin = 0.0;
+  double least = 0.0;
+  if (iso_of(instance.surface) != nullptr) {
+    // A point in touch moves with its isosurface (update_felt); here is one that the scene newly has.
+    if (slot.touching || slot.iso.field != 0) return proxy;
+    const IsoSurface& iso = *iso_of(instance.surface);
+    const IsoView view = iso.view_at(0, iso.threshold() + ball_level(instance, scene));
+    FieldJet jet;
+    // A proxy that rested on the last scene's surface lies on this one's, or on either side of it by rounding.
+    least = 2.0 * view.skin();
+    if (!view.sample(local, slot.hint.iso, jet)) return proxy;
+    if (view.sigma * (jet.value - view.threshold) >= least * jet.gradient.norm()) return proxy;
+    foot = view.closest(local, infinity, slot.hint.iso);
+    if (!foot.found()) return proxy;
+    front = view.outward(foot.point, slot.hint.iso);
+    skin = 2.0 * least - (ball_level(instance, scene) > 0.0 ? scene.probe_radius() : 0.0);
+  } else if (const ReliefSurface* relief = proxied_relief(instance)) {
+    foot = relief->closest(local, infinity, slot.hint);
+    if (!foot.found()) return proxy;
+    front = relief->point(slot.hint.relief.frame, slot.hint.relief.u, slot.hint.relief.v).normal();
+    skin = relief->skin();
+  } else if (const ParametricSurface* parametric = proxied_parametric(instance)) {
+    foot = parametric->closest(local, infinity, slot.hint);
+    if (!foot.found()) return proxy;
+    front = parametric->normal(parametric->jet(slot.hint.parametric.uv));
+    skin = parametric->skin();
+  } else if (const CustomSurface* custom = proxied_custom(instance)) {
+    foot = custom->closest(local, infinity, slot.hint);
+    if (!foot.found()) return proxy;
+    front = custom->outward(foot.point);
+    skin = custom->skin();
+  } else if (const MeshSurface* mesh = constraint_mesh(instance)) {
+    foot = mesh->closest(local, infinity, slot.hint);
+    if (!foot.found()) return proxy;
+    front = pseudonormal(mesh->mesh(), foot.element, foot.barycentric).normalized();
+    skin = mesh->skin();
+  } else {
+    GeneratedPatch patch;
+    patch.start(**std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface),
+                *std::get_if<GeneratedGeometryLaw>(&instance.law));
+    foot = patch.closest(local, slot.hint);
+    if (!foot.found()) return proxy;
+    front = foot.normal;
+    skin = patch.skin();
+  }
+  if (!front_side) front = -front;
+  if ((local - foot.point).dot(front) >= least) return proxy;
+  return pose.apply(foot.point + (skin + scene.probe_radius()) * front);
+}
+
 Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept {
   Vec3 proxy = state.proxy;
   for (ContactState& slot : state.contacts) {
-    const Instance& instance = scene.instances()[slot.instance];
+    const Instance& instance = scene.felt()[slot.instance];
     if (instance.sides != Sides::front || !constrains(instance.law)) continue;
-    const Pose& pose = instance.world_from_object;
-    const Vec3 local = pose.apply_inverse(proxy);
-    Vec3 front;
-    Foot foot;
-    double skin = 0.0;
-    double least = 0.0;
-    if (iso_of(instance.surface) != nullptr) {
-      // A point in touch moves with its isosurface (update_felt); here is one that the scene newly has.
-      if (slot.touching || slot.iso.field != 0) continue;
-      const IsoSurface& iso = *iso_of(instance.surface);
-      const IsoView view = iso.view_at(0, iso.threshold() + ball_level(instance, scene));
-      FieldJet jet;
-      // A proxy that rested on the last scene's surface lies on this one's, or on either side of it by rounding.
-      least = 2.0 * view.skin();
-      if (!view.sample(local, slot.hint.iso, jet)) continue;
-      if (view.sigma * (jet.value - view.threshold) >= least * jet.gradient.norm()) continue;
-      foot = view.closest(local, infinity, slot.hint.iso);
-      if (!foot.found()) continue;
-      front = view.outward(foot.point, slot.hint.iso);
-      skin = 2.0 * least - (ball_level(instance, scene) > 0.0 ? scene.probe_radius() : 0.0);
-    } else if (const ReliefSurface* relief = proxied_relief(instance)) {
-      foot = relief->closest(local, infinity, slot.hint);
-      if (!foot.found()) continue;
-      front = relief->point(slot.hint.relief.frame, slot.hint.relief.u, slot.hint.relief.v).normal();
-      skin = relief->skin();
-    } else if (const ParametricSurface* parametric = proxied_parametric(instance)) {
-      foot = parametric->closest(local, infinity, slot.hint);
-      if (!foot.found()) continue;
-      front = parametric->normal(parametric->jet(slot.hint.parametric.uv));
-      skin = parametric->skin();
-    } else if (const MeshSurface* mesh = constraint_mesh(instance)) {
-      foot = mesh->closest(local, infinity, slot.hint);
-      if (!foot.found()) continue;
-      front = pseudonormal(mesh->mesh(), foot.element, foot.barycentric).normalized();
-      skin = mesh->skin();
-    } else {
-      GeneratedPatch patch;
-      patch.start(**std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface),
-                  *std::get_if<GeneratedGeometryLaw>(&instance.law));
-      foot = patch.closest(local, slot.hint);
-      if (!foot.found()) continue;
-      front = foot.normal;
-      skin = patch.skin();
-    }
-    if ((local - foot.point).dot(front) < least) proxy = pose.apply(foot.point + (skin + scene.probe_radius()) * front);
+    proxy = pushed_to_front(scene, instance, true, slot, proxy);
   }
   return proxy;
 }

@@ -27,6 +27,11 @@ struct ProxyAnswer {
 ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSample& probe, const Vec3& held,
                           bool moved) noexcept;
 
+/// The place on the front (or the back) of a surface nearest to a proxy (world) that it has come over; the proxy where
+/// that is there already. [servo]
+Vec3 pushed_to_front(const Scene& scene, const Instance& instance, bool front_side, ContactState& slot,
+                     const Vec3& proxy) noexcept;
+
 /// After a change of the scene: where the proxy may start, outside of every front that it would now be behind. [servo]
 Vec3 reacquired(const Scene& scene, ProxyState& state) noexcept;
 

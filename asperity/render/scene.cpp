@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "asperity/core/units.h"
+#include "asperity/render/coat_material.h"
+#include "asperity/render/custom_law.h"
 #include "asperity/render/fine_contact.h"
 #include "asperity/surface/relief_mesh.h"
 
@@ -31,7 +34,7 @@ Status make_dense(Instance& instance, std::size_t index) {
     return success();
   }
   const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
-  const std::uint64_t identity = relief.base().index().identity();
+  const std::uint64_t identity = relief.identity();
   const int subdivisions = law->subdivisions > 0 ? law->subdivisions : texel_subdivisions(relief);
   if (instance.dense != nullptr && instance.dense->relief == identity && instance.dense->subdivisions == subdivisions)
     return success();
@@ -86,18 +89,24 @@ Status check_pair(const Instance& instance, const std::string& place) {
   const bool implicit = implicit_of(instance.surface) != nullptr;
   const bool parametric = parametric_of(instance.surface) != nullptr;
   const bool bare = instance.surface.index() == 0;
+  const CustomSurface* custom = custom_of(instance.surface);
   const auto refuse = [&](const char* what, const char* accepted) {
     return Error{ErrorCode::unsupported_pair,
                  fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
                              implicit     ? "an implicit surface"
                              : iso        ? "an isosurface"
                              : parametric ? "a parametric surface"
+                             : custom     ? "a surface of its own"
                              : bare       ? "a bare mesh"
                                           : "a relief"),
                  {},
                  place + ".law",
                  accepted};
   };
+  if (const CustomLaw* own = custom_of(instance.law)) {
+    if (own->fits(instance.surface)) return success();
+    return refuse("another kind of surface", "another law, or a surface that this one says it fits");
+  }
   if (needs_field(instance.law) && !iso) return refuse("a volume", "another law, or a surface with a volume");
   if (needs_potential(instance.law) && !implicit)
     return refuse("an implicit surface", "another law, or a surface with \"implicit\"");
@@ -107,10 +116,43 @@ Status check_pair(const Instance& instance, const std::string& place) {
                   implicit ? "proxy, virtual-contact-point, magnetic, normal-perturbation, avila or cross-uncross"
                            : "proxy, avila or cross-uncross");
   }
-  if (parametric && !std::holds_alternative<ProxyLaw>(instance.law))
+  if ((parametric || custom != nullptr) && !std::holds_alternative<ProxyLaw>(instance.law))
     return refuse(needs_coat(instance.law) ? "a coat" : "triangles", "proxy");
   if (bare && needs_coat(instance.law))
     return refuse("a coat", "proxy, god-object or force-shading, or a coat on the mesh");
+  return success();
+}
+
+/// Whether what a coat adds beside its heights can be felt by the law.
+Status check_coat(const Instance& instance, const std::string& place, double probe_radius) {
+  const ReliefSurface* relief = relief_of(instance);
+  const bool proxy = std::holds_alternative<ProxyLaw>(instance.law);
+  const bool by_coat = proxy || std::holds_alternative<HeightFieldLaw>(instance.law) ||
+                       std::holds_alternative<MesostructureLaw>(instance.law);
+  const auto refuse = [&](std::string what, const char* where, const char* accepted) {
+    return Error{ErrorCode::unsupported_pair, std::move(what), {}, place + where, accepted};
+  };
+  const MaterialMaps* maps = relief != nullptr ? relief->coat().materials() : nullptr;
+  const bool sticky = instance.material.stickiness > 0.0 || (maps != nullptr && maps->has(MaterialChannel::stickiness));
+  if (sticky && (relief == nullptr || !proxy || probe_radius > 0.0)) {
+    return refuse(fmt::format("is sticky, which a point feels on a coated mesh by the law \"proxy\" alone, and \"{}\" "
+                              "is felt otherwise",
+                              instance.name),
+                  ".material.stickiness", "0, or law proxy, a coat and probe.radius 0");
+  }
+  const bool draws = instance.material.magnetism > 0.0 || (maps != nullptr && maps->has(MaterialChannel::magnetism));
+  if (draws && (relief == nullptr || !by_coat || probe_radius > 0.0)) {
+    return refuse(
+        fmt::format("draws the probe, which a point feels on a coated mesh by the laws proxy, height-field and "
+                    "mesostructure alone, and \"{}\" is felt otherwise",
+                    instance.name),
+        ".material.magnetism", "0, or one of those laws, a coat and probe.radius 0");
+  }
+  if (relief != nullptr && relief->coat().moves() && !by_coat) {
+    return refuse(
+        fmt::format("changes with time, and the law \"{}\" feels a coat that stands still", law_name(instance.law)),
+        ".coat", "the laws proxy, height-field or mesostructure, or layers without a frequency and a drift");
+  }
   return success();
 }
 
@@ -121,10 +163,11 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
                  "holds no surface",
                  {},
                  place + ".surface",
-                 "a mesh, relief, isosurface, implicit or parametric surface"};
+                 "a mesh, relief, isosurface, implicit, parametric or custom surface"};
   }
   ASPERITY_CHECK(check_pair(instance, place));
   ASPERITY_CHECK(check_fine(instance, place));
+  ASPERITY_CHECK(check_coat(instance, place, probe_radius));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
   if (probe_radius > 0.0 && !constrains(instance.law)) {
@@ -160,7 +203,7 @@ Box transformed(const Box& box, const Pose& pose) {
 }  // namespace
 
 const char* surface_kind(const Surface& surface) {
-  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit", "parametric"};
+  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit", "parametric", "custom"};
   return names[surface.index()];
 }
 
@@ -183,6 +226,11 @@ const ImplicitSurface* implicit_of(const Surface& surface) noexcept {
 const ParametricSurface* parametric_of(const Surface& surface) noexcept {
   const auto* parametric = std::get_if<std::shared_ptr<const ParametricSurface>>(&surface);
   return parametric != nullptr ? parametric->get() : nullptr;
+}
+
+const CustomSurface* custom_of(const Surface& surface) noexcept {
+  const auto* custom = std::get_if<std::shared_ptr<const CustomSurface>>(&surface);
+  return custom != nullptr ? custom->get() : nullptr;
 }
 
 const IsoSurface* iso_of(const Surface& surface) noexcept {
@@ -212,23 +260,161 @@ Material material_at(const ImplicitSurface& surface, const Material& own, const 
   return out;
 }
 
-Material local_material(const Instance& instance, const Vec3& p, SparseHint& hint) noexcept {
+Material local_material(const Instance& instance, const Vec3& p, Hint& hint) noexcept {
+  if (const ReliefSurface* relief = relief_of(instance)) {
+    if (relief->coat().materials() == nullptr) return instance.material;
+    return mapped_material(instance, *relief, coat_place(instance, *relief, p, hint));
+  }
   const ImplicitSurface* implicit = implicit_of(instance.surface);
   if (implicit == nullptr || !implicit->grid().has_materials()) return instance.material;
   // A ball's centre, or a probe pressed in, is off the surface by what the potential says.
-  const Potential here = implicit->grid().trilinear(p, hint);
-  return material_at(*implicit, instance.material, p - here.value * here.gradient, hint);
+  const Potential here = implicit->grid().trilinear(p, hint.sparse);
+  return material_at(*implicit, instance.material, p - here.value * here.gradient, hint.sparse);
+}
+
+bool has_local_material(const Instance& instance) noexcept {
+  if (const ReliefSurface* relief = relief_of(instance)) return relief->coat().materials() != nullptr;
+  const ImplicitSurface* implicit = implicit_of(instance.surface);
+  return implicit != nullptr && implicit->grid().has_materials();
+}
+
+const ReliefSurface* relief_of(const Instance& instance) noexcept {
+  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
+  return relief != nullptr ? relief->get() : nullptr;
 }
 
 const TriangleMesh& base_mesh(const Surface& surface) {
   return base_of(surface)->mesh();
 }
 
-Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius, std::vector<FieldEffect> effects) {
-  if (!std::isfinite(probe_radius) || probe_radius < 0.0) {
-    return Error{
-        ErrorCode::bad_value, fmt::format("is {}", probe_radius), {}, "probe.radius", "a length of 0 or more (m, mm)"};
+namespace {
+
+/// An effect as it stands in a scene that is shown `zoom` times its size.
+FieldEffect magnified(const FieldEffect& effect, double zoom) {
+  FieldEffect out = effect;
+  out.largest_force *= zoom;
+  double factor = zoom;
+  if (effect.kind == FieldEffectKind::viscosity || effect.kind == FieldEffectKind::pao ||
+      effect.kind == FieldEffectKind::viscosity_scalars)
+    factor = zoom * zoom;
+  // Its gradient is steeper by as much as the force is less.
+  if (effect.kind == FieldEffectKind::gradient) factor = 1.0;
+  std::vector<TransferFunction::Point> points(effect.transfer.points().begin(), effect.transfer.points().end());
+  for (TransferFunction::Point& point : points) point.answer *= factor;
+  if (Result<TransferFunction> transfer = TransferFunction::build(std::move(points)))
+    out.transfer = std::move(*transfer);
+  return out;
+}
+
+/// Laws, material and friction of an instance as they stand in a scene that is shown `zoom` times its size. Lengths of
+/// the scene are that much shorter than the hand's, energies and times are the same.
+void magnify(Instance& instance, double zoom) {
+  const double force = zoom;
+  const double stiffness = zoom * zoom;
+  const double speed = 1.0 / zoom;
+  instance.zoom = zoom;
+  if (instance.fine != nullptr && instance.fine->settings().resolution > 0.0) {
+    FineSettings fine = instance.fine->settings();
+    fine.resolution /= zoom;
+    // Only a length has changed, which stays one: it builds.
+    if (Result<FineFeatures> built = FineFeatures::build(std::move(fine)))
+      instance.fine = std::make_shared<const FineFeatures>(std::move(*built));
   }
+  Material& material = instance.material;
+  material.stiffness *= stiffness;
+  material.damping *= stiffness;
+  material.viscosity *= stiffness;
+  material.magnetism *= stiffness;
+  material.magnetic_band /= zoom;
+  material.stickiness *= force;
+  FrictionLaw& friction = material.friction;
+  friction.stiffness *= stiffness;
+  friction.damping *= stiffness;
+  friction.viscosity *= stiffness;
+  friction.break_away *= force;
+  friction.stick_speed *= speed;
+  friction.stribeck_speed *= speed;
+  if (auto* avila = std::get_if<AvilaLaw>(&instance.law)) {
+    avila->largest_force *= force;
+    avila->retarding *= stiffness;
+  }
+  if (auto* crossing = std::get_if<CrossUncrossLaw>(&instance.law)) crossing->retarding *= stiffness;
+  if (auto* contact = std::get_if<VirtualContactPointLaw>(&instance.law)) contact->depth_gain *= zoom;
+}
+
+Status check(const SceneSettings& settings) {
+  const auto bad = [](const char* place, double value, const char* accepted) {
+    return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, place, accepted};
+  };
+  const auto length = [](double value) { return std::isfinite(value) && value >= 0.0; };
+  if (!length(settings.probe_radius))
+    return bad("probe.radius", settings.probe_radius, "a length of 0 or more (m, mm)");
+  if (!length(settings.tip_radius)) return bad("probe.tip", settings.tip_radius, "a length of 0 or more (m, mm)");
+  if (auto valid = validate(settings.view); !valid) return std::move(valid).error().at("view");
+  if (!length(settings.handover.count()))
+    return bad("handover", settings.handover.count(), "a time of 0 or more (s, ms)");
+  if (!length(settings.change_power)) return bad("change_power", settings.change_power, "a power of 0 or more (W)");
+  if (!(settings.level_rate > 0.0)) return bad("level_rate", settings.level_rate, "levels a second, above 0");
+  return success();
+}
+
+/// Where an instance may be until its motion ends.
+Box swept_bounds(const Instance& instance, const Box& local) {
+  const Box here = transformed(local, instance.world_from_object);
+  const Motion& motion = instance.motion;
+  if (!motion.moves()) return here;
+  const Vec3& origin = instance.world_from_object.position;
+  double reach = 0.0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const Vec3 at((corner & 1U) != 0 ? here.upper.x() : here.lower.x(),
+                  (corner & 2U) != 0 ? here.upper.y() : here.lower.y(),
+                  (corner & 4U) != 0 ? here.upper.z() : here.lower.z());
+    reach = std::max(reach, (at - origin).norm());
+  }
+  const bool turns = !motion.velocity.angular.isZero(0.0);
+  Box all = here;
+  if (turns) {
+    all = Box();
+    all.include(origin);
+    all = all.grown(reach);
+  }
+  // A motion without an end goes anywhere that a device may.
+  constexpr double farthest = 1e6;
+  const Vec3 way = motion.horizon.count() * motion.velocity.linear;
+  const Vec3 last = way.allFinite() ? way : Vec3(Vec3::Constant(0.0));
+  Box moved = all;
+  moved.lower += last;
+  moved.upper += last;
+  all.include(moved.lower);
+  all.include(moved.upper);
+  return way.allFinite() ? all : all.grown(farthest);
+}
+
+Status check_motion(const Instance& instance, std::size_t index) {
+  const Motion& motion = instance.motion;
+  const bool finite = motion.velocity.linear.allFinite() && motion.velocity.angular.allFinite() &&
+                      std::isfinite(motion.since.count()) && motion.horizon.count() >= 0.0;
+  const bool volume = iso_of(instance.surface) != nullptr;
+  const std::string place = fmt::format("surfaces[{}].motion", index);
+  if (!finite)
+    return Error{ErrorCode::bad_value, "is not finite", {}, place, "finite velocities, a horizon of 0 s or more"};
+  if (volume && motion.moves())
+    return Error{
+        ErrorCode::unsupported_pair, "moves a volume", {}, place, "motion of meshes, reliefs and parametric surfaces"};
+  return success();
+}
+
+}  // namespace
+
+Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius, std::vector<FieldEffect> effects) {
+  SceneSettings settings;
+  settings.probe_radius = probe_radius;
+  return build(std::move(instances), settings, std::move(effects));
+}
+
+Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings& settings,
+                           std::vector<FieldEffect> effects) {
+  ASPERITY_CHECK(check(settings));
   if (instances.empty() && effects.empty()) {
     return Error{ErrorCode::bad_value, "holds nothing to touch", {}, "surfaces", "at least one surface or effect"};
   }
@@ -236,17 +422,38 @@ Result<Scene> Scene::build(std::vector<Instance> instances, double probe_radius,
     if (auto valid = validate(effects[i]); !valid) return std::move(valid).error().at(fmt::format("effects[{}]", i));
   }
   Scene scene;
+  scene.settings_ = settings;
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    ASPERITY_CHECK(check(instances[i], i, probe_radius));
+    ASPERITY_CHECK(check(instances[i], i, settings.probe_radius));
+    ASPERITY_CHECK(check_motion(instances[i], i));
+    if (settings.view.zoom != 1.0 && relief_of(instances[i]) == nullptr && has_local_material(instances[i])) {
+      return Error{ErrorCode::unsupported_pair,
+                   fmt::format("zooms, and the material of \"{}\" is stored in its volume", instances[i].name),
+                   {},
+                   "view.zoom",
+                   "1, or an implicit surface of one material"};
+    }
     ASPERITY_CHECK(make_dense(instances[i], i));
-    // Room for the probe and for the skin that it rests on.
-    const Box bounds = surface_bounds(instances[i].surface);
-    scene.bounds_.push_back(
-        transformed(bounds.grown(probe_radius + 1e-6 * bounds.diagonal()), instances[i].world_from_object));
+    // Room for the probe and for the skin that it rests on, and for what draws it.
+    Box bounds = surface_bounds(instances[i].surface);
+    // A deforming mesh may come out of its bounds before the next scene: room for that.
+    constexpr double room = 0.02;
+    if (const MeshSurface* base = base_of(instances[i].surface); base != nullptr &&
+                                                                 iso_of(instances[i].surface) == nullptr &&
+                                                                 base->index().identity() != base->index().lineage())
+      bounds = bounds.grown(room * bounds.diagonal());
+    scene.bounds_.push_back(swept_bounds(
+        instances[i], bounds.grown(scene.probe_radius() + attraction_reach(instances[i]) / settings.view.zoom +
+                                   1e-6 * bounds.diagonal())));
   }
   scene.instances_ = std::move(instances);
   scene.effects_ = std::move(effects);
-  scene.probe_radius_ = probe_radius;
+  if (settings.view.zoom != 1.0) {
+    scene.felt_ = scene.instances_;
+    for (Instance& instance : scene.felt_) magnify(instance, settings.view.zoom);
+    scene.felt_effects_ = scene.effects_;
+    for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
+  }
   scene.epoch_ = next_epoch();
   return scene;
 }
@@ -266,6 +473,8 @@ std::size_t Scene::memory_bytes() const noexcept {
       bytes += implicit->memory_bytes();
     } else if (const ParametricSurface* parametric = parametric_of(instance.surface)) {
       bytes += parametric->memory_bytes();
+    } else if (const CustomSurface* custom = custom_of(instance.surface)) {
+      bytes += custom->memory_bytes();
     } else if (const IsoSurface* iso = iso_of(instance.surface)) {
       bytes += iso->field().memory_bytes();
     } else if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface)) {

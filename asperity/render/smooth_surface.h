@@ -1,13 +1,13 @@
 #pragma once
-// A smooth surface as the joint solve sees it: a relief, a parametric surface, or an isosurface of this tick. Private
-// to render.
+// A smooth surface as the joint solve sees it: a relief, a parametric surface, a program's own, or an isosurface of
+// this tick. Private to render.
 
 #include "asperity/render/iso_proxy.h"
 #include "asperity/render/scene.h"
 
 namespace asperity {
 
-/// One of the three, or nothing where an instance is felt on triangles.
+/// One of the four, or nothing where an instance is felt on triangles.
 class SmoothSurface {
  public:
   SmoothSurface() = default;
@@ -17,19 +17,22 @@ class SmoothSurface {
     if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface))
       relief_ = relief->get();
     parametric_ = parametric_of(instance.surface);
+    custom_ = custom_of(instance.surface);
     if (const IsoSurface* iso = iso_of(instance.surface)) iso_ = felt_view(*iso, slot);
   }
 
   explicit operator bool() const noexcept {
-    return relief_ != nullptr || parametric_ != nullptr || iso_.field != nullptr;
+    return relief_ != nullptr || parametric_ != nullptr || custom_ != nullptr || iso_.field != nullptr;
   }
   [[nodiscard]] double skin() const noexcept {
     if (parametric_ != nullptr) return parametric_->skin();
+    if (custom_ != nullptr) return custom_->skin();
     return relief_ != nullptr ? relief_->skin() : iso_.skin();
   }
   /// Smallest length over which the surface changes (m).
   [[nodiscard]] double grain() const noexcept {
     if (parametric_ != nullptr) return parametric_->grain();
+    if (custom_ != nullptr) return custom_->grain();
     return relief_ != nullptr ? relief_->grain() : iso_.field->narrowest_cell();
   }
   /// Distance from which the way to the nearest point tells the direction better than the surface's own normal does
@@ -37,7 +40,8 @@ class SmoothSurface {
   [[nodiscard]] double direction_from() const noexcept { return iso_.field == nullptr ? skin() : 0.05 * grain(); }
   /// Whether two of its tangent planes may meet in an edge.
   [[nodiscard]] bool has_folds() const noexcept {
-    return relief_ != nullptr || (parametric_ != nullptr && parametric_->has_folds());
+    return relief_ != nullptr || (parametric_ != nullptr && parametric_->has_folds()) ||
+           (custom_ != nullptr && custom_->has_folds());
   }
   /// How far beyond touching a tangent plane is worth knowing (m).
   [[nodiscard]] double plane_reach() const noexcept { return has_folds() ? 2.0 * skin() : 0.05 * grain(); }
@@ -46,6 +50,11 @@ class SmoothSurface {
     if (parametric_ != nullptr) {
       const Foot foot = parametric_->closest(p, bound, hint);
       if (foot.found()) front = parametric_->normal(parametric_->jet(hint.parametric.uv));
+      return foot;
+    }
+    if (custom_ != nullptr) {
+      const Foot foot = custom_->closest(p, bound, hint);
+      if (foot.found()) front = custom_->outward(foot.point);
       return foot;
     }
     if (relief_ == nullptr) {
@@ -61,6 +70,7 @@ class SmoothSurface {
   [[nodiscard]] SweptHit segment(const Segment& motion, Sides sides, Hint& hint) const noexcept {
     if (relief_ != nullptr) return relief_->segment(motion, 0.0, sides, hint);
     if (parametric_ != nullptr) return parametric_->segment(motion, 0.0, sides, hint);
+    if (custom_ != nullptr) return custom_->segment(motion, 0.0, sides, hint);
     SweptHit hit;
     const IsoCrossing crossing = iso_.first_touch(motion, sides, hint.iso);
     hit.hit = crossing.found;
@@ -71,6 +81,7 @@ class SmoothSurface {
  private:
   const ReliefSurface* relief_ = nullptr;
   const ParametricSurface* parametric_ = nullptr;
+  const CustomSurface* custom_ = nullptr;
   IsoView iso_;
 };
 

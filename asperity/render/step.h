@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/samples.h"
 #include "asperity/material/friction.h"
@@ -34,6 +37,20 @@ struct TextureState {
   Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last
 };
 
+/// A place on a mesh that goes along with it.
+struct SurfaceAnchor {
+  std::uint32_t face = no_index;
+  double u = 0.0;  ///< barycentric coordinates of the second and third corner
+  double v = 0.0;
+  double height = 0.0;  ///< of the proxy over the face (m)
+};
+
+/// What a law that a program has added remembers.
+struct CustomLawState {
+  std::uint64_t law = 0;  ///< that it belongs to; 0: none
+  alignas(16) std::array<std::byte, 64> bytes{};
+};
+
 /// What one probe remembers of one instance between ticks.
 struct ContactState {
   std::uint32_t instance = no_index;
@@ -48,11 +65,30 @@ struct ContactState {
   /// What that has taken from the hand and not yet given back (J); laws of implicit surfaces: what may be spent where
   /// the local stiffness rises.
   double turn_budget = 0.0;
+  Pose pose;                  ///< of the instance at this tick
+  Pose pose_before;           ///< at the last one
+  std::uint64_t lineage = 0;  ///< of the mesh whose face and corners `anchor` is of; 0: none
+  SurfaceAnchor anchor;       ///< where it was touched at the last tick, to be found again when the surface has moved
+  bool side_known = false;    ///< `outside` is of the last tick
+  bool outside = false;       ///< of a surface that changes: the free probe was on the front of it
+  double potential = 0.0;     ///< J: what a law without a proxy and the surface's attraction held at the last tick
+  double share = 1.0;         ///< of their force that is rendered: less where a change was not paid for
+  bool counted = false;       ///< `potential` is of the last tick
+  bool in_touch = false;      ///< law that moves the proxy: it was held here at the last tick
+  bool placed = false;        ///< `pose` is of the last tick
+  bool level_known = false;   ///< hint.moment's level is one that was felt
+  bool moment_known = false;
+  bool moment_changed = false;  ///< another state of the coat is felt than at the last tick
+  double stiffness = 0.0;       ///< N/m: what a law without a proxy pushed with at the last tick
+  double attraction = 0.0;      ///< J: potential of what draws the probe, at the last tick
+  bool attraction_known = false;
+  double debt = 0.0;       ///< J: what the surface's attraction owes; it rests until that is paid
   double side = 1.0;       ///< proxy on a relief: 1 when touched from the front, -1 from the back
   ReliefPoint point;       ///< proxy on a relief, while touching: the surface at hint.relief (object frame)
   IsoContact iso;          ///< on an isosurface
   FrictionState friction;  ///< of the friction law, where it is not within the proxy (object frame)
   TextureState texture;
+  CustomLawState custom;
 };
 
 /// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per
@@ -64,8 +100,12 @@ struct ProxyState {
   Vec3 previous_probe = Vec3::Zero();  ///< m, world, of the last tick
   /// Of the spring between probe and proxy: what a tick may hold at most, and what changes of the scene may spend.
   EnergyTank tank;
-  double stiffness = 0.0;  ///< N/m of that spring as rendered at the last tick; 0: free
-  bool sliding = false;    ///< several surfaces at once: friction was overcome at the last tick
+  double stiffness = 0.0;               ///< N/m of that spring as rendered at the last tick; 0: free
+  Vec3 force = Vec3::Zero();            ///< N, scene: answered at the last tick
+  Vec3 residual = Vec3::Zero();         ///< N, scene: what is left of the force before the last change of the scene
+  Vec3 workspace_probe = Vec3::Zero();  ///< m: the probe at the last tick, before the view
+  View view;                            ///< of the last tick
+  bool sliding = false;                 ///< several surfaces at once: friction was overcome at the last tick
   /// Level at which volumes larger than memory are felt: -1, the finest that is in memory; 0 or more, this one, as a
   /// replay does after having it fetched.
   int wanted_level = -1;

@@ -97,7 +97,7 @@ Result<std::vector<LoopRateRow>> loop_rates(const Scene& scene, const StrokePath
     if (!thin(instances, stride, row)) continue;
     for (const Law& law : laws) {
       for (Instance& instance : instances) instance.law = law;
-      ASPERITY_TRY(const Scene felt, Scene::build(instances, scene.probe_radius()));
+      ASPERITY_TRY(const Scene felt, Scene::build(instances, scene.settings()));
       row.p50.push_back(median_tick(felt, path, rate, ticks));
     }
     rows.push_back(std::move(row));

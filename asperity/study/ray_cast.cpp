@@ -43,8 +43,8 @@ Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
   return inside;
 }
 
-/// First touch of a mesh, an isosurface or a parametric surface by the ray's parameter, from the sides that can be
-/// touched.
+/// First touch of a mesh, an isosurface, a parametric or a custom surface by the ray's parameter, from the sides that
+/// can be touched.
 template <class S>
 Pixel first_touch(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
   const Segment motion{origin + part.from * direction, origin + part.to * direction};
@@ -64,6 +64,11 @@ Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direc
 }
 
 Pixel first_hit(const ParametricSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+Pixel first_hit(const CustomSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
                 Hint& hint) {
   return first_touch(surface, origin, direction, part, sides, hint);
 }
@@ -144,6 +149,9 @@ bool smooth(const Cell& cell, const Camera& camera) {
   if (!first.hit()) return true;
   const double twist =
       cell.corners[0]->depth + cell.corners[3]->depth - cell.corners[1]->depth - cell.corners[2]->depth;
+  for (const Pixel* corner : cell.corners) {
+    if (corner->filled != first.filled) return false;
+  }
   return std::abs(twist) < camera.pixel * first.depth;
 }
 
@@ -197,6 +205,7 @@ void fill_cell(const Cell& cell, const Camera& camera, RayCaster& caster, PixelG
         const double v = static_cast<double>(y - cell.y0) / (cell.y1 - cell.y0);
         const double weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
         out = {0.0, Vec3::Zero()};
+        out.filled = cell.corners[0]->filled;
         for (int k = 0; k < 4; ++k) {
           out.depth += weights[k] * cell.corners[k]->depth;
           out.normal += weights[k] * cell.corners[k]->normal;
@@ -252,6 +261,13 @@ Pixel RayCaster::cast(double x, double y) {
       normal.normalize();
     }
     nearest.normal = instance.world_from_object.rotate(normal);
+    nearest.filled = 0.0;
+    if (instance.closed_from != nullptr) {
+      const ClosedRelief& closed = instance.closed_from->closed;
+      const ReliefPlace& place = hints_[i].relief;
+      const Vec3 barycentric(1.0 - place.u - place.v, place.u, place.v);
+      nearest.filled = closed.rise_at(place.frame.face, barycentric) > closed.report.tolerance ? 1.0 : 0.0;
+    }
   }
   return nearest;
 }

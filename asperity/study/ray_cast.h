@@ -16,6 +16,7 @@ struct Pixel {
   double depth = infinity;           ///< along the camera's forward axis (m); infinity: nothing
   Vec3 normal = Vec3::Zero();        ///< unit, towards the eye; bent by a texture
   std::uint32_t element = no_index;  ///< face, where the surface has faces
+  double filled = 0.0;               ///< 1 where closing has raised the relief
   [[nodiscard]] bool hit() const { return depth < infinity; }
 };
 

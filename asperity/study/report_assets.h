@@ -5,7 +5,8 @@
 
 namespace asperity {
 
-/// report.js, report.css, dygraph.min.js, dygraph.min.css, friction.js, in this order (asperity/study/CMakeLists.txt).
+/// report.js, report.css, dygraph.min.js, dygraph.min.css, friction.js, path.js, in this order
+/// (asperity/study/CMakeLists.txt).
 std::span<const EmbeddedFile> report_assets();
 
 }  // namespace asperity

@@ -112,6 +112,24 @@ class SeriesBuilder {
     return implicit != nullptr && implicit->is_mesh();
   }
 
+  /// The probe as it is in the scene.
+  [[nodiscard]] Vec3 in_scene(const TraceRecord& tick) const {
+    const View& view = scene_.settings().view;
+    return view.identity() ? tick.probe.pose.position : view.to_scene(tick.probe.pose.position);
+  }
+  /// The hand's force along the scene's axes (N).
+  [[nodiscard]] Vec3 force_in_scene(const TraceRecord& tick) const {
+    const View& view = scene_.settings().view;
+    return view.identity() ? tick.rendered.wrench.force : Vec3(view.orientation * tick.rendered.wrench.force);
+  }
+  /// The hand's force over a length of the scene (N/m).
+  double scene_stiffness(const Instance& instance, const TraceRecord& tick) {
+    return scene_.settings().view.zoom * stiffness_at(instance, tick);
+  }
+  static Pose pose_of(const Instance& instance, const TraceRecord& tick) {
+    return instance.motion.at(instance.world_from_object, tick.probe.time);
+  }
+
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
     const std::uint32_t index = tick.rendered.contact.instance;
     const bool known = tick.rendered.flags.has(TickFlag::contact) && index < scene_.instances().size();
@@ -121,8 +139,8 @@ class SeriesBuilder {
   /// Stiffness of what is touched, where it is touched (N/m).
   double stiffness_at(const Instance& instance, const TraceRecord& tick) {
     const ContactSummary& contact = tick.rendered.contact;
-    const Vec3 place = instance.world_from_object.apply_inverse(contact.point);
-    return local_material(instance, place, hints_[contact.instance].sparse).stiffness;
+    const Vec3 place = pose_of(instance, tick).apply_inverse(contact.point);
+    return local_material(instance, place, hints_[contact.instance]).stiffness;
   }
 
   void add_energy(const TraceRecord& tick) {
@@ -137,7 +155,7 @@ class SeriesBuilder {
     double push = instance ? stiffness_at(*instance, tick) * depth : 0.0;
     // M1's layer is as stiff as the field is steep.
     if (instance && std::holds_alternative<AvilaLaw>(instance->law))
-      push = std::max(0.0, tick.rendered.wrench.force.dot(tick.rendered.contact.normal));
+      push = std::max(0.0, force_in_scene(tick).dot(tick.rendered.contact.normal));
     out_.stored.push_back(0.5 * push * depth + tick.rendered.parts.held);
   }
 
@@ -154,6 +172,9 @@ class SeriesBuilder {
       return;
     }
     const Surface& shape = shapes_.instances()[tick.rendered.contact.instance].surface;
+    // Judged by the finest level, as it was then.
+    if (const ReliefSurface* relief = relief_of(*instance); relief != nullptr && relief->coat().moves())
+      hints_[tick.rendered.contact.instance].moment.time = tick.probe.time.count();
     if (iso_of(shape) != nullptr && !has_exact_mesh(shape)) {
       add_isosurface(*instance, *iso_of(shape), tick);
       if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
@@ -164,17 +185,21 @@ class SeriesBuilder {
       add_parametric(*instance, *parametric, tick);
       return;
     }
-    const Pose& pose = instance->world_from_object;
+    if (const CustomSurface* custom = custom_of(shape)) {
+      add_custom(*instance, *custom, tick);
+      return;
+    }
+    const Pose pose = pose_of(*instance, tick);
     const MeshSurface& base = *base_of(shape);
     const bool proxied = constrains(instance->law);
-    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
+    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
     Hint& hint = hints_[tick.rendered.contact.instance];
     BasePoint at = base_point(base, felt, hint);
     if (at.face == no_index) return;
-    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     out_.near_edge.back() = near_sharp_edge(base, felt - at.height * at.up) ? 1 : 0;
     in_shell(shape, felt, hint, at);
-    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / stiffness_at(*instance, tick), force);
+    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / scene_stiffness(*instance, tick), force);
     add_direction(*instance, shape, at, force);
     if (const Coat* coat = coat_of(shape)) {
       const Vec3 along = pose.rotate_inverse(tangent);
@@ -206,12 +231,11 @@ class SeriesBuilder {
   }
 
   void add_isosurface(const Instance& instance, const IsoSurface& surface, const TraceRecord& tick) {
-    const Pose& pose = instance.world_from_object;
-    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Pose pose = pose_of(instance, tick);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     const bool proxied = constrains(instance.law);
-    const Vec3 felt = proxied
-                          ? pose.apply_inverse(tick.rendered.proxy)
-                          : Vec3(pose.apply_inverse(tick.probe.pose.position) + force / stiffness_at(instance, tick));
+    const Vec3 felt = proxied ? pose.apply_inverse(tick.rendered.proxy)
+                              : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
     Hint& hint = hints_[tick.rendered.contact.instance];
     const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
     if (!foot.found()) return;
@@ -228,27 +252,46 @@ class SeriesBuilder {
 
   /// Heights over the smooth surface that wears a texture: what is felt against the texture as it is.
   void add_textured(const Instance& instance, const TraceRecord& tick) {
-    const Pose& pose = instance.world_from_object;
+    const Pose pose = pose_of(instance, tick);
     const ContactSummary& contact = tick.rendered.contact;
-    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     const Vec3 point = pose.apply_inverse(contact.point);
     const Vec3 normal = pose.rotate_inverse(contact.normal);
     Hint& hint = hints_[contact.instance];
     const ParametricSurface* parametric = parametric_of(instance.surface);
     if (parametric != nullptr && !parametric->closest(point, parametric->bounds().diagonal(), hint).found()) return;
     const TextureShape shape = texture_at(instance, contact.element, point, normal, hint, 0.0);
-    const double over = (pose.apply_inverse(tick.probe.pose.position) - point).dot(normal) - scene_.probe_radius();
-    out_.followed.back() = over + force.dot(normal) / stiffness_at(instance, tick);
+    const double over = (pose.apply_inverse(in_scene(tick)) - point).dot(normal) - scene_.probe_radius();
+    out_.followed.back() = over + force.dot(normal) / scene_stiffness(instance, tick);
     out_.relief.back() = shape.height;
     if (!(force.norm() >= least_force)) return;
     const Vec3 reference = normal - shape.gradient;
     out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
   }
 
+  /// Heights over a program's own surface, on the side touched.
+  void add_custom(const Instance& instance, const CustomSurface& surface, const TraceRecord& tick) {
+    const Pose pose = pose_of(instance, tick);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
+    const bool proxied = constrains(instance.law);
+    const Vec3 felt = proxied ? pose.apply_inverse(tick.rendered.proxy)
+                              : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
+    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hints_[tick.rendered.contact.instance]);
+    if (!foot.found()) return;
+    const Vec3 front = surface.outward(foot.point);
+    const double side = force.dot(front) < 0.0 ? -1.0 : 1.0;
+    const double over = foot.normal.dot(front) < 0.0 ? -foot.distance : foot.distance;
+    out_.followed.back() = side * over - scene_.probe_radius();
+    out_.relief.back() = 0.0;
+    if (!(force.norm() >= least_force) || front.isZero()) return;
+    const Vec3 reference = side * front;
+    out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
+  }
+
   /// Heights over the surface without its features, on the side touched.
   void add_parametric(const Instance& instance, const ParametricSurface& surface, const TraceRecord& tick) {
-    const Pose& pose = instance.world_from_object;
-    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
+    const Pose pose = pose_of(instance, tick);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     const Vec3 felt = pose.apply_inverse(tick.rendered.proxy);
     Hint& hint = hints_[tick.rendered.contact.instance];
     const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
@@ -266,14 +309,14 @@ class SeriesBuilder {
 
   /// Heights over the mesh where a texture, or an offset, is what is felt.
   void add_texture(const Instance& instance, const ImplicitSurface& surface, const TraceRecord& tick) {
-    const Pose& pose = instance.world_from_object;
+    const Pose pose = pose_of(instance, tick);
     const bool proxied = constrains(instance.law);
-    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : tick.probe.pose.position);
+    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
     Hint& hint = hints_[tick.rendered.contact.instance];
     const BasePoint at = base_point(*surface.mesh(), felt, hint);
     if (at.face == no_index) return;
-    const Vec3 force = pose.rotate_inverse(tick.rendered.wrench.force);
-    const double deflection = proxied ? 0.0 : force.dot(at.up) / stiffness_at(instance, tick);
+    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
+    const double deflection = proxied ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.segment({base + reach * at.up, base - reach * at.up}, 0.0, Sides::front, hint);
@@ -297,7 +340,7 @@ class SeriesBuilder {
       at.slope = sample.gradient;
       return;
     }
-    const CoatSample sample = (*relief)->coat().sample((*relief)->base().mesh(), at.face, at.barycentric);
+    const CoatSample sample = (*relief)->coat_sample(at.face, at.barycentric, hint.moment);
     at.relief = sample.height;
     at.slope = at.up - sample.gradient;
   }

@@ -84,7 +84,9 @@ Colour lit(const Pixel& pixel, const Lights& lights, double open) {
   const double fill = std::max(0.0, pixel.normal.dot(lights.fill));
   const double sky = 0.5 + 0.5 * pixel.normal.dot(lights.up);
   const Vec3 light = key * Vec3(0.86, 0.84, 0.80) + fill * Vec3(0.12, 0.13, 0.15) + open * sky * Vec3(0.32, 0.33, 0.35);
-  const Vec3 colour = (albedo.array() * light.array() * (0.45 + 0.55 * open)).matrix();
+  // Where closing has filled something in, another material is seen.
+  const Vec3 paint = pixel.filled > 0.0 ? Vec3(albedo.cwiseProduct(Vec3(1.0, 0.62, 0.35))) : Vec3(albedo);
+  const Vec3 colour = (paint.array() * light.array() * (0.45 + 0.55 * open)).matrix();
   return {to_srgb(colour.x()), to_srgb(colour.y()), to_srgb(colour.z())};
 }
 

@@ -114,9 +114,9 @@ double median_texel(const TriangleMesh& mesh, const Mesostructure& maps, const C
 }
 
 /// Marks the vertices at whose edges texture coordinates differ between the two faces, other than by whole repeats.
-/// Empty when there are none.
-std::vector<std::uint8_t> uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool repeats) {
-  std::vector<std::uint8_t> marked;
+/// Leaves `marked` empty when there are none.
+void mark_uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool repeats,
+                   std::vector<std::uint8_t>& marked) {
   const auto mark = [&](std::uint32_t face, int edge) {
     if (marked.empty()) marked.resize(mesh.positions().size(), 0);
     for (int end = 0; end < 2; ++end) marked[mesh.triangles()[face][static_cast<std::size_t>((edge + end) % 3)]] = 1;
@@ -153,18 +153,28 @@ std::vector<std::uint8_t> uv_seams(const TriangleMesh& mesh, const CoatSettings&
       if ((shift[0] - shift[1]).norm() > 0.5) mark(face, edge);
     }
   }
-  return marked;
 }
 
 }  // namespace
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
                          const CoatSettings& settings) {
-  return build(mesh, std::vector<std::shared_ptr<const Mesostructure>>{std::move(maps)}, {}, settings);
+  CoatParts parts;
+  parts.maps.push_back(std::move(maps));
+  return build(mesh, std::move(parts), settings);
 }
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, std::vector<std::shared_ptr<const Mesostructure>> maps,
                          std::vector<std::uint8_t> map_of_face, const CoatSettings& settings) {
+  CoatParts parts;
+  parts.maps = std::move(maps);
+  parts.map_of_face = std::move(map_of_face);
+  return build(mesh, std::move(parts), settings);
+}
+
+Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSettings& settings) {
+  auto& maps = parts.maps;
+  auto& map_of_face = parts.map_of_face;
   if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0 || settings.repeat.maxCoeff() > most_repeats)
     return bad_repeat(settings.repeat);
   if (auto valid = validate(settings.stitching); !valid) return std::move(valid).error().at("stitching");
@@ -183,59 +193,184 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, std::vector<std::shared_ptr<c
   coat.settings_ = settings;
   coat.lowest_ = infinity;
   coat.highest_ = -infinity;
-  coat.texel_size_ = infinity;
-  bool repeats = true;
   for (const auto& one : maps) {
-    const HeightMap& heights = one->heights();
-    coat.lowest_ = std::min(coat.lowest_, heights.lowest());
-    coat.highest_ = std::max(coat.highest_, heights.highest());
-    coat.texel_size_ = std::min(coat.texel_size_, median_texel(mesh, *one, settings));
-    repeats = repeats && heights.wrap() == Wrap::repeat;
-  }
-  if (coat.texel_size_ == 0.0)
-    return bad_mapping("is \"uv\", but the texture coordinates span no area on any face looked at");
-  if (maps.size() > 1) {
-    coat.has_seams_ = true;
-  } else if (settings.mapping != Mapping::triplanar && coat.lowest_ < coat.highest_) {
-    if (settings.mapping == Mapping::uv) coat.seam_vertices_ = uv_seams(mesh, settings, repeats);
-    coat.has_seams_ = settings.mapping == Mapping::per_face || !coat.seam_vertices_.empty();
+    const HeightRange all = one->range();
+    coat.lowest_ = std::min(coat.lowest_, all.lowest);
+    coat.highest_ = std::max(coat.highest_, all.highest);
   }
   coat.maps_ = std::move(maps);
   coat.map_of_face_ = std::move(map_of_face);
+  coat.materials_ = std::move(parts.materials);
+  ASPERITY_CHECK(coat.take_layers(std::move(parts.layers)));
+  coat.texel_size_ = coat.finest_grain(mesh);
+  if (coat.texel_size_ == 0.0)
+    return bad_mapping("is \"uv\", but the texture coordinates span no area on any face looked at");
+  coat.find_seams(mesh);
   return coat;
+}
+
+Status Coat::take_layers(std::vector<CoatLayer> layers) {
+  if (layers.size() > most_layers) {
+    return Error{ErrorCode::too_large,
+                 fmt::format("are {}", layers.size()),
+                 {},
+                 "layers",
+                 fmt::format("at most {}", most_layers)};
+  }
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const CoatLayer& layer = layers[i];
+    const std::string place = fmt::format("layers[{}]", i);
+    if ((layer.maps == nullptr) == (layer.solid == nullptr))
+      return Error{ErrorCode::mismatch, "names neither or both of a map and a solid", {}, place, "one of them"};
+    if (!layer.repeat.allFinite() || layer.repeat.minCoeff() <= 0.0 || layer.repeat.maxCoeff() > most_repeats)
+      return bad_repeat(layer.repeat).at(place);
+    if (layer.solid != nullptr) {
+      places_ = true;
+      moves_ = moves_ || layer.solid->moves();
+      lowest_ -= layer.solid->spec().amplitude;
+      highest_ += layer.solid->spec().amplitude;
+    } else {
+      const HeightRange all = layer.maps->range();
+      lowest_ += all.lowest;
+      highest_ += all.highest;
+    }
+  }
+  layers_ = std::move(layers);
+  return success();
+}
+
+double Coat::finest_grain(const TriangleMesh& mesh) const {
+  double finest = infinity;
+  for (const auto& one : maps_) finest = std::min(finest, median_texel(mesh, *one, settings_));
+  for (const CoatLayer& layer : layers_) {
+    if (layer.solid != nullptr) {
+      // As many samples a wavelength as make a spline follow a wave to a per cent.
+      constexpr double samples = 8.0;
+      finest = std::min(finest, layer.solid->grain() / samples);
+    } else {
+      CoatSettings laid = settings_;
+      laid.repeat = settings_.repeat.cwiseProduct(layer.repeat);
+      finest = std::min(finest, median_texel(mesh, *layer.maps, laid));
+    }
+  }
+  return finest;
+}
+
+void Coat::find_seams(const TriangleMesh& mesh) {
+  if (maps_.size() > 1) {
+    has_seams_ = true;
+    return;
+  }
+  if (settings_.mapping == Mapping::triplanar) return;
+  bool relief = false;
+  const auto look = [&](const Mesostructure& maps, const Vec2& repeat) {
+    const HeightRange all = maps.range();
+    if (!(all.lowest < all.highest)) return;
+    relief = true;
+    CoatSettings laid = settings_;
+    laid.repeat = repeat;
+    if (settings_.mapping == Mapping::uv)
+      mark_uv_seams(mesh, laid, maps.heights().wrap() == Wrap::repeat, seam_vertices_);
+  };
+  look(*maps_.front(), settings_.repeat);
+  for (const CoatLayer& layer : layers_) {
+    if (layer.maps != nullptr) look(*layer.maps, settings_.repeat.cwiseProduct(layer.repeat));
+  }
+  has_seams_ = relief && (settings_.mapping == Mapping::per_face || !seam_vertices_.empty());
 }
 
 std::size_t Coat::memory_bytes() const noexcept {
   std::size_t bytes =
       sizeof(*this) + map_of_face_.capacity() + seam_vertices_.capacity() + maps_.capacity() * sizeof(maps_.front());
   for (const auto& maps : maps_) bytes += maps->memory_bytes();
+  for (const CoatLayer& layer : layers_)
+    bytes += sizeof(layer) + (layer.maps != nullptr ? layer.maps->memory_bytes() : sizeof(SolidMesostructure));
+  if (materials_ != nullptr) bytes += materials_->memory_bytes();
   return bytes;
 }
 
-CoatFrame Coat::frame(const TriangleMesh& mesh, std::uint32_t face) const noexcept {
+CoatFrame Coat::frame(const TriangleMesh& mesh, std::uint32_t face, const CoatMoment& moment) const noexcept {
   CoatFrame frame;
   frame.maps = &maps_on(face);
+  frame.layers = layers_;
+  frame.moment = moment;
+  frame.level = moment.level;
   frame.triplanar = settings_.mapping == Mapping::triplanar;
+  if (frame.maps->detail() != nullptr) {
+    const auto [a, b, c] = mesh.corners(face);
+    frame.twice_area = (b - a).cross(c - a).norm();
+  }
   if (!frame.triplanar) {
     const auto st = corner_coordinates(mesh, face, settings_);
     frame.st = st[0];
     frame.st_u = st[1] - st[0];
     frame.st_v = st[2] - st[0];
-    return frame;
+    if (!places_) return frame;
   }
   const TriangleMesh::Triangle& t = mesh.triangles()[face];
   frame.point = mesh.positions()[t[0]];
   frame.point_u = mesh.positions()[t[1]] - frame.point;
   frame.point_v = mesh.positions()[t[2]] - frame.point;
+  if (!frame.triplanar) return frame;
   frame.normal = mesh.vertex_normal(t[0]);
   frame.normal_u = mesh.vertex_normal(t[1]) - frame.normal;
   frame.normal_v = mesh.vertex_normal(t[2]) - frame.normal;
   return frame;
 }
 
+CoatFrame Coat::layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept {
+  CoatFrame laid = frame;
+  laid.maps = layer.maps.get();
+  laid.layers = {};
+  laid.st = frame.st.cwiseProduct(layer.repeat);
+  laid.st_u = frame.st_u.cwiseProduct(layer.repeat);
+  laid.st_v = frame.st_v.cwiseProduct(layer.repeat);
+  if (frame.level > 0.0) {
+    // The level of another map that leaves out as much as this one's.
+    const DetailPyramid* own = frame.maps->detail();
+    const DetailPyramid* other = layer.maps->detail();
+    laid.level = 0.0;
+    if (own != nullptr && other != nullptr) {
+      const int below = std::min(static_cast<int>(frame.level), own->levels());
+      const double above = own->scale(std::min(below + 1, own->levels()));
+      const double part = frame.level - below;
+      const double scale = part > 0.0 ? own->scale(below) + part * (above - own->scale(below)) : own->scale(below);
+      laid.level = other->level_of_scale(scale);
+    }
+  }
+  return laid;
+}
+
 HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
+  HeightJet sum = own_jet(frame, u, v);
+  for (const CoatLayer& layer : frame.layers) {
+    HeightJet more;
+    if (layer.solid != nullptr) {
+      const SolidJet solid = layer.solid->jet(frame.point + u * frame.point_u + v * frame.point_v, frame.moment.time);
+      const Vec3 along_u = solid.second * frame.point_u;
+      const Vec3 along_v = solid.second * frame.point_v;
+      more = {solid.height,
+              solid.gradient.dot(frame.point_u),
+              solid.gradient.dot(frame.point_v),
+              along_u.dot(frame.point_u),
+              along_u.dot(frame.point_v),
+              along_v.dot(frame.point_v)};
+    } else {
+      more = own_jet(layer_frame(frame, layer), u, v);
+    }
+    sum.height += more.height;
+    sum.u += more.u;
+    sum.v += more.v;
+    sum.uu += more.uu;
+    sum.uv += more.uv;
+    sum.vv += more.vv;
+  }
+  return sum;
+}
+
+HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
   if (frame.triplanar) return triplanar_jet(frame, u, v);
-  const HeightCurvature map = frame.maps->heights().curvature(frame.st + u * frame.st_u + v * frame.st_v);
+  const HeightCurvature map = frame.maps->curvature(frame.st + u * frame.st_u + v * frame.st_v, frame.level);
   const auto second = [&](const Vec2& a, const Vec2& b) {
     return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
   };
@@ -276,7 +411,7 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
                         2.0 * (q_v * q_v + q * q_vv)};
     const int s = (axis + 1) % 3;
     const int t = (axis + 2) % 3;
-    const HeightCurvature map = frame.maps->heights().curvature(Vec2(point[s] / tile.x(), point[t] / tile.y()));
+    const HeightCurvature map = frame.maps->curvature(Vec2(point[s] / tile.x(), point[t] / tile.y()), frame.level);
     const Vec2 st_u(frame.point_u[s] / tile.x(), frame.point_u[t] / tile.y());
     const Vec2 st_v(frame.point_v[s] / tile.x(), frame.point_v[t] / tile.y());
     const double hu = map.gradient.dot(st_u);
@@ -309,7 +444,24 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
 }
 
 HeightRange Coat::range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept {
-  const HeightMap& heights = frame.maps->heights();
+  HeightRange sum = own_range(frame, corners);
+  for (const CoatLayer& layer : frame.layers) {
+    HeightRange more;
+    if (layer.solid != nullptr) {
+      Box box;
+      for (int k = 0; k < 3; ++k)
+        box.include(Vec3(frame.point + corners[k].x() * frame.point_u + corners[k].y() * frame.point_v));
+      more = layer.solid->range(0.5 * (box.lower + box.upper), 0.5 * box.extent(), frame.moment.time);
+    } else {
+      more = own_range(layer_frame(frame, layer), corners);
+    }
+    sum.lowest += more.lowest;
+    sum.highest += more.highest;
+  }
+  return sum;
+}
+
+HeightRange Coat::own_range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept {
   if (!frame.triplanar) {
     Vec2 lower = Vec2::Constant(infinity);
     Vec2 upper = Vec2::Constant(-infinity);
@@ -318,7 +470,7 @@ HeightRange Coat::range(const CoatFrame& frame, const Vec2 corners[3]) const noe
       lower = lower.cwiseMin(st);
       upper = upper.cwiseMax(st);
     }
-    return heights.range_over(lower, upper);
+    return frame.maps->range_over(lower, upper, frame.level);
   }
   // A weighted mean of three heights lies between their bounds.
   Vec3 lower = Vec3::Constant(infinity);
@@ -333,17 +485,95 @@ HeightRange Coat::range(const CoatFrame& frame, const Vec2 corners[3]) const noe
   for (int axis = 0; axis < 3; ++axis) {
     const int s = (axis + 1) % 3;
     const int t = (axis + 2) % 3;
-    const HeightRange one = heights.range_over(Vec2(lower[s] / tile.x(), lower[t] / tile.y()),
-                                               Vec2(upper[s] / tile.x(), upper[t] / tile.y()));
+    const HeightRange one = frame.maps->range_over(Vec2(lower[s] / tile.x(), lower[t] / tile.y()),
+                                                   Vec2(upper[s] / tile.x(), upper[t] / tile.y()), frame.level);
     all.lowest = std::min(all.lowest, one.lowest);
     all.highest = std::max(all.highest, one.highest);
   }
   return all;
 }
 
-CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
-  return settings_.mapping == Mapping::triplanar ? sample_triplanar(mesh, face, barycentric)
-                                                 : sample_flat(mesh, face, barycentric);
+CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric,
+                        const CoatMoment& moment) const noexcept {
+  CoatSample sample = settings_.mapping == Mapping::triplanar ? sample_triplanar(mesh, face, barycentric)
+                                                              : sample_flat(mesh, face, barycentric);
+  if (layers_.empty() && moment.level <= 0.0) return sample;
+  // What the layers and the level change, on top of the first map's own normals.
+  const HeightJet all = jet(frame(mesh, face, moment), barycentric[1], barycentric[2]);
+  const BarycentricFrame base = barycentric_frame(mesh, face);
+  const Vec3 gradient = all.u * base.gradient[1] + all.v * base.gradient[2];
+  const double up = std::max(1e-3, sample.normal.dot(base.normal));
+  const Vec3 slope = base.normal - sample.normal / up;
+  sample.normal = (base.normal - slope - (gradient - sample.gradient)).normalized();
+  sample.height = all.height;
+  sample.gradient = gradient;
+  return sample;
+}
+
+double Coat::level_for(const CoatFrame& frame, double scale, double height) const noexcept {
+  const DetailPyramid* detail = frame.maps->detail();
+  if (detail == nullptr) return 0.0;
+  double stretch = 1.0;
+  if (!frame.triplanar) {
+    // How much larger one repeat is here than on the tile that the pyramid's scales were measured on.
+    const double area = std::abs(frame.st_u.x() * frame.st_v.y() - frame.st_u.y() * frame.st_v.x());
+    const double nominal = area * frame.maps->tile().x() * frame.maps->tile().y();
+    if (nominal > 0.0 && frame.twice_area > 0.0) stretch = std::sqrt(frame.twice_area / nominal);
+  }
+  return std::max(detail->level_of_scale(scale / stretch), detail->level_of_removed(height));
+}
+
+LocalMaterial Coat::material(const CoatFrame& frame, double u, double v) const noexcept {
+  // Slopes and the lay from texture coordinates to barycentric ones.
+  const auto turned = [](LocalMaterial local, const Vec2& st_u, const Vec2& st_v) {
+    for (Vec2& slope : local.slope) slope = Vec2(slope.dot(st_u), slope.dot(st_v));
+    const double det = st_u.x() * st_v.y() - st_u.y() * st_v.x();
+    const Vec2 lay = local.lay;
+    local.lay = det == 0.0 ? Vec2(Vec2::Zero())
+                           : Vec2((lay.x() * st_v.y() - lay.y() * st_v.x()) / det,
+                                  (st_u.x() * lay.y() - st_u.y() * lay.x()) / det);
+    return local;
+  };
+  if (!frame.triplanar)
+    return turned(materials_->sample(frame.st + u * frame.st_u + v * frame.st_v), frame.st_u, frame.st_v);
+  const Vec3 point = frame.point + u * frame.point_u + v * frame.point_v;
+  const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
+  const Vec2& tile = frame.maps->tile();
+  LocalMaterial sum;
+  std::array<Vec2, mapped_channels> weighted;  // sum of d(weight) value
+  weighted.fill(Vec2::Zero());
+  double total = 0.0;
+  Vec2 total_slope = Vec2::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double q = normal[axis] * normal[axis] - triplanar_threshold * normal.squaredNorm();
+    if (q <= 0.0) continue;
+    const Vec2 q_slope(2.0 * (normal[axis] * frame.normal_u[axis] - triplanar_threshold * normal.dot(frame.normal_u)),
+                       2.0 * (normal[axis] * frame.normal_v[axis] - triplanar_threshold * normal.dot(frame.normal_v)));
+    const double w = q * q;
+    const Vec2 w_slope = 2.0 * q * q_slope;
+    const int s = (axis + 1) % 3;
+    const int t = (axis + 2) % 3;
+    const Vec2 st_u(frame.point_u[s] / tile.x(), frame.point_u[t] / tile.y());
+    const Vec2 st_v(frame.point_v[s] / tile.x(), frame.point_v[t] / tile.y());
+    const LocalMaterial one = turned(materials_->sample(Vec2(point[s] / tile.x(), point[t] / tile.y())), st_u, st_v);
+    for (std::size_t c = 0; c < mapped_channels; ++c) {
+      sum.value[c] += w * one.value[c];
+      sum.slope[c] += w * one.slope[c];
+      weighted[c] += one.value[c] * w_slope;
+    }
+    sum.lay += w * one.lay;
+    sum.lay_strength += w * one.lay_strength;
+    total += w;
+    total_slope += w_slope;
+  }
+  const double per = 1.0 / std::max(total, std::numeric_limits<double>::min());
+  for (std::size_t c = 0; c < mapped_channels; ++c) {
+    sum.value[c] *= per;
+    sum.slope[c] = per * (sum.slope[c] + weighted[c] - sum.value[c] * total_slope);
+  }
+  sum.lay *= per;
+  sum.lay_strength *= per;
+  return sum;
 }
 
 CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept {
@@ -355,9 +585,11 @@ CoatSample Coat::sample_flat(const TriangleMesh& mesh, std::uint32_t face, const
   sample.height = maps.height;
   sample.gradient = maps.gradient.x() * texture.gradient_s + maps.gradient.y() * texture.gradient_t;
   if (own.has_normal_map()) {
-    // The map's axes as they lie on the triangle: along growing s and growing t.
-    const Vec3 tangent = unit_or_zero(texture.gradient_s);
+    // The map's axes as they lie on the triangle (glTF 2.0, MikkTSpace): the bitangent along growing t, the tangent at
+    // right angles to it, on the side where s grows.
     const Vec3 bitangent = unit_or_zero(texture.gradient_t);
+    const double hand = texture.gradient_s.cross(texture.gradient_t).dot(frame.normal) < 0.0 ? -1.0 : 1.0;
+    const Vec3 tangent = hand * bitangent.cross(frame.normal);
     const Vec2 slope = slope_of(maps.normal);
     sample.normal = (frame.normal - slope.x() * tangent - slope.y() * bitangent).normalized();
   } else {

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "asperity/core/result.h"
 #include "asperity/field/mesostructure.h"
+#include "asperity/field/solid_mesostructure.h"
 #include "asperity/geometry/mesh.h"
+#include "asperity/surface/material_maps.h"
 #include "asperity/surface/stitching.h"
 
 namespace asperity {
@@ -23,6 +27,28 @@ struct CoatSettings {
   Mapping mapping = Mapping::uv;
   Vec2 repeat = Vec2::Ones();  ///< uv and per_face: how often the map fits into one unit of texture coordinate, above 0
   Stitching stitching = {};    ///< how heights are joined where neighbouring faces disagree
+};
+
+/// Which of its states a coat is asked about: it may have levels of detail and change with time.
+struct CoatMoment {
+  double level = 0.0;  ///< of detail: 0 the finest, between two levels heights are mixed
+  double time = 0.0;   ///< s
+  friend bool operator==(const CoatMoment&, const CoatMoment&) = default;
+};
+
+/// Another mesostructure summed to the first: a map laid by the coat's own mapping, or a solid one in the mesh's frame.
+struct CoatLayer {
+  std::shared_ptr<const Mesostructure> maps;  ///< flat mappings: `repeat` times the coat's; triplanar: by its own tile
+  Vec2 repeat = Vec2::Ones();                 ///< above 0
+  std::shared_ptr<const SolidMesostructure> solid;  ///< in place of `maps`
+};
+
+/// What a coat is made of.
+struct CoatParts {
+  std::vector<std::shared_ptr<const Mesostructure>> maps;  ///< at least one
+  std::vector<std::uint8_t> map_of_face;                   ///< face i wears maps[map_of_face[i]]; empty: the first
+  std::vector<CoatLayer> layers;                           ///< at most most_layers, summed on every face
+  std::shared_ptr<const MaterialMaps> materials;           ///< nullptr: the material is one throughout
 };
 
 /// The coat at one place of one triangle, object frame.
@@ -46,11 +72,15 @@ struct HeightJet {
 /// The mapping of one triangle, ready to be sampled: what a probe that stays on it need not fetch again.
 struct CoatFrame {
   const Mesostructure* maps = nullptr;
+  std::span<const CoatLayer> layers;
+  CoatMoment moment;
+  double level = 0.0;  ///< of `maps` at the moment
   bool triplanar = false;
   Vec2 st = Vec2::Zero();  ///< flat mappings: texture coordinates of the first corner, and their change along u and v
   Vec2 st_u = Vec2::Zero();
   Vec2 st_v = Vec2::Zero();
-  Vec3 point = Vec3::Zero();  ///< triplanar: position over tile of the first corner, and its change along u and v
+  double twice_area = 0.0;    ///< of the triangle (m^2), where there are levels of detail
+  Vec3 point = Vec3::Zero();  ///< triplanar and solid layers: the first corner (m), and its change along u and v
   Vec3 point_u = Vec3::Zero();
   Vec3 point_v = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< triplanar: smooth normal of the first corner, and its change
@@ -68,13 +98,19 @@ class Coat {
   /// mismatch (one entry a face, each naming a map). [build]
   static Result<Coat> build(const TriangleMesh& mesh, std::vector<std::shared_ptr<const Mesostructure>> maps,
                             std::vector<std::uint8_t> map_of_face, const CoatSettings& settings);
+  static constexpr std::size_t most_layers = 8;
+  /// Several mesostructures summed, and maps of the material. Errors: those above, mismatch ("layers"), too_large.
+  /// [build]
+  static Result<Coat> build(const TriangleMesh& mesh, CoatParts parts, const CoatSettings& settings);
 
   /// The coat over the point of `face` with these barycentric coordinates, which may lie outside the triangle (its
   /// plane and its mapping are continued): stitching needs that. [servo]
-  [[nodiscard]] CoatSample sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) const noexcept;
+  [[nodiscard]] CoatSample sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric,
+                                  const CoatMoment& moment = {}) const noexcept;
 
   /// What sampling on `face` needs of the mesh. [servo]
-  [[nodiscard]] CoatFrame frame(const TriangleMesh& mesh, std::uint32_t face) const noexcept;
+  [[nodiscard]] CoatFrame frame(const TriangleMesh& mesh, std::uint32_t face,
+                                const CoatMoment& moment = {}) const noexcept;
   /// The face's own height with its derivatives, before any stitching; (u, v) may lie outside the triangle. [servo]
   [[nodiscard]] HeightJet jet(const CoatFrame& frame, double u, double v) const noexcept;
   /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
@@ -86,7 +122,22 @@ class Coat {
     return has_seams_ && (seam_vertices_.empty() || seam_vertices_[vertex] != 0);
   }
 
-  /// Bounds of every height of the coat (m), overshoot of the reconstruction included. [any]
+  /// Its levels of detail beside the finest one: those of the first mesostructure. [any]
+  [[nodiscard]] int levels() const noexcept {
+    return maps_.front()->detail() == nullptr ? 0 : maps_.front()->detail()->levels();
+  }
+  /// The level (with its fraction) at which nothing finer than `scale` (m on the surface, around the frame's face) is
+  /// left and the heights left out are at most `height` (m). Both rules are met; 0 where there are no levels. [servo]
+  [[nodiscard]] double level_for(const CoatFrame& frame, double scale, double height) const noexcept;
+  /// Whether heights change with time. [any]
+  [[nodiscard]] bool moves() const noexcept { return moves_; }
+  /// Its maps of the material, or nullptr. [any]
+  [[nodiscard]] const MaterialMaps* materials() const noexcept { return materials_.get(); }
+  /// What the material's maps say over a place of the frame's face. Only with materials(). [servo]
+  [[nodiscard]] LocalMaterial material(const CoatFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] std::span<const CoatLayer> layers() const noexcept { return layers_; }
+
+  /// Bounds of every height of the coat (m), at every level and moment, overshoot of the reconstruction included. [any]
   [[nodiscard]] double lowest() const noexcept { return lowest_; }
   [[nodiscard]] double highest() const noexcept { return highest_; }
   /// mh of the papers: the largest absolute height (m). [any]
@@ -108,10 +159,20 @@ class Coat {
   [[nodiscard]] CoatSample sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
                                             const Vec3& barycentric) const noexcept;
 
+  [[nodiscard]] HeightJet own_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightRange own_range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
+  [[nodiscard]] CoatFrame layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept;
+  Status take_layers(std::vector<CoatLayer> layers);
+  void find_seams(const TriangleMesh& mesh);
+  [[nodiscard]] double finest_grain(const TriangleMesh& mesh) const;
 
   std::vector<std::shared_ptr<const Mesostructure>> maps_;
   std::vector<std::uint8_t> map_of_face_;  ///< empty: the first map everywhere
+  std::vector<CoatLayer> layers_;
+  std::shared_ptr<const MaterialMaps> materials_;
+  bool moves_ = false;
+  bool places_ = false;  ///< some layer is solid: frames hold places in space
   CoatSettings settings_;
   double lowest_ = 0.0;
   double highest_ = 0.0;

@@ -1,11 +1,12 @@
 #pragma once
 
+#include "asperity/geometry/mesh_refitter.h"
 #include "asperity/geometry/triangle_index.h"
 #include "asperity/surface/surface.h"
 
 namespace asperity {
 
-/// A triangle mesh touched as it is.
+/// A triangle mesh touched as it is. Copies share mesh and search structure.
 class MeshSurface {
  public:
   explicit MeshSurface(TriangleIndex index) : index_(std::move(index)) {}
@@ -35,6 +36,24 @@ class MeshSurface {
   TriangleIndex index_;
 };
 static_assert(SurfaceQuery<MeshSurface>);
+
+/// A mesh whose vertices the caller moves, as surfaces that can be touched: see MeshRefitter.
+class DeformableMesh {
+ public:
+  /// [build]
+  explicit DeformableMesh(const MeshSurface& rest, int threads = 2) : refitter_(rest.index(), threads), rest_(rest) {}
+  /// The surface with vertices at `positions` (m), by the numbers of rest().mesh(). Errors: mismatch (count), bad_mesh
+  /// (not finite, a triangle that lost its area). [build]
+  Result<MeshSurface> moved(std::span<const Vec3> positions) {
+    ASPERITY_TRY(TriangleIndex index, refitter_.moved(positions));
+    return MeshSurface(std::move(index));
+  }
+  [[nodiscard]] const MeshSurface& rest() const noexcept { return rest_; }
+
+ private:
+  MeshRefitter refitter_;
+  MeshSurface rest_;
+};
 
 /// Normal of the feature (face, edge or vertex) that a barycentric position lies on, whose sign tells inside from
 /// outside exactly (angle-weighted pseudonormals: Baerentzen and Aanaes 2005). Not unit on edges. [servo]

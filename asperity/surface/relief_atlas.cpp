@@ -35,7 +35,26 @@ Error bake_error(std::string what, std::string place, std::string accepted) {
 
 }  // namespace
 
+std::size_t atlas_texels(std::size_t faces, int texels) noexcept {
+  const Layout layout(faces, texels);
+  return static_cast<std::size_t>(layout.width()) * static_cast<std::size_t>(layout.height());
+}
+
 Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, int texels, const RayHeight& ray,
+                                const Progress& progress) {
+  ShellPrism prism{};
+  std::uint32_t of = no_index;
+  return bake_relief(
+      mesh, texels,
+      [&](const AtlasTexel& texel) {
+        if (texel.face != of) prism = shell.prism(mesh, texel.face);
+        of = texel.face;
+        return ray(prism.base_at(texel.u, texel.v), prism.direction_at(texel.u, texel.v));
+      },
+      progress);
+}
+
+Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& heights,
                                 const Progress& progress) {
   if (texels < 2) return bake_error(fmt::format("is {}", texels), "texels", "2 texels an edge or more");
   const std::size_t faces = mesh.triangles().size();
@@ -71,24 +90,30 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, in
     const Vec2 along_u = corner[1] - corner[0];
     const Vec2 along_v = corner[2] - corner[0];
     const double det = along_u.x() * along_v.y() - along_u.y() * along_v.x();
-    const ShellPrism prism = shell.prism(mesh, static_cast<std::uint32_t>(face));
     for (int y = 0; y < layout.tile; ++y) {
       for (int x = 0; x < layout.tile; ++x) {
         if ((x + y >= layout.tile) != upper) continue;
         const Vec2 offset = Vec2(x0 + x + 0.5, y0 + y + 0.5) - corner[0];
         const double u = (offset.x() * along_v.y() - offset.y() * along_v.x()) / det;
         const double v = (along_u.x() * offset.y() - along_u.y() * offset.x()) / det;
-        const double height = ray(prism.base_at(u, v), prism.direction_at(u, v));
+        const auto row = static_cast<std::size_t>(atlas.height - 1 - (static_cast<int>(y0) + y));
+        const auto column = static_cast<std::size_t>(x0) + static_cast<std::size_t>(x);
+        const std::ptrdiff_t onward = upper ? -1 : 1;
+        const AtlasTexel texel{static_cast<std::uint32_t>(face),
+                               u,
+                               v,
+                               row * static_cast<std::size_t>(atlas.width) + column,
+                               onward,
+                               -onward * atlas.width};
+        const double height = heights(texel);
         if (!std::isfinite(height)) {
           return bake_error(fmt::format("the ray from barycentric ({:.3g}, {:.3g}) meets nothing", u, v),
                             fmt::format("face {}", face), "a surface that every ray of the shell meets");
         }
-        const auto row = static_cast<std::size_t>(atlas.height - 1 - (static_cast<int>(y0) + y));
-        const auto column = static_cast<std::size_t>(x0) + static_cast<std::size_t>(x);
-        atlas.heights[row * static_cast<std::size_t>(atlas.width) + column] = static_cast<float>(height);
+        atlas.heights[texel.index] = static_cast<float>(height);
       }
     }
-    if (progress && face % 256 == 0)
+    if (progress && face % 16 == 0)
       progress("baking the relief", static_cast<double>(face) / static_cast<double>(faces));
   }
   return atlas;

@@ -2,6 +2,8 @@
 // Baking: any surface near a mesh, written down as heights over it along the shell's rays.
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -28,5 +30,23 @@ struct ReliefAtlas {
 /// below 2, a height that is not finite, naming the face), too_large. [build]
 Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, int texels, const RayHeight& ray,
                                 const Progress& progress = {});
+
+/// One texel of an atlas: the place of a triangle (barycentric u, v; outside the triangle in its border) that it holds.
+struct AtlasTexel {
+  std::uint32_t face = 0;
+  double u = 0.0;
+  double v = 0.0;
+  std::size_t index = 0;     ///< in ReliefAtlas::heights
+  std::ptrdiff_t right = 1;  ///< from `index` to the texel one further along u, and along v
+  std::ptrdiff_t up = 1;
+};
+/// Height (m) at a texel.
+using TexelHeight = std::function<double(const AtlasTexel&)>;
+
+/// The same from heights by texel, asked once for each, face by face. [build]
+Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& height,
+                                const Progress& progress = {});
+/// Texels that the atlas would have. [any]
+std::size_t atlas_texels(std::size_t faces, int texels) noexcept;
 
 }  // namespace asperity

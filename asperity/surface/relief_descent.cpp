@@ -201,7 +201,7 @@ class Walker {
     for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
       if (descent_.moves >= descent_.budget) break;
       ReliefPlace here;
-      here.frame = face == place_.frame.face ? place_.frame : surface_.frame(face);
+      here.frame = face == place_.frame.face ? place_.frame : surface_.frame(face, place_.frame.coat.moment);
       const TriangleMesh::Triangle& t = mesh.triangles()[face];
       here.u = t[1] == vertex ? 1.0 : 0.0;
       here.v = t[2] == vertex ? 1.0 : 0.0;
@@ -323,7 +323,7 @@ bool cross_edge(const ReliefSurface& surface, ReliefPlace& place, int k) noexcep
       if (there[j] == here[static_cast<std::size_t>(corner)]) barycentric[j] = coordinate(place, corner);
     }
   }
-  place.frame = surface.frame(other);
+  place.frame = surface.frame(other, place.frame.coat.moment);
   place.u = barycentric[1];
   place.v = barycentric[2];
   // The coordinate of the corner that is not on the edge stays exactly 0.

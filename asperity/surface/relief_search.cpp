@@ -270,8 +270,8 @@ class PatchRay {
 /// Searches triangles for the point of their relief that is nearest to a point.
 class NearestSearch {
  public:
-  NearestSearch(const ReliefSurface& surface, const Vec3& p, double bound) noexcept
-      : surface_(surface), p_(p), distance_(bound) {}
+  NearestSearch(const ReliefSurface& surface, const Vec3& p, double bound, const CoatMoment& moment) noexcept
+      : surface_(surface), p_(p), moment_(moment), distance_(bound) {}
 
   [[nodiscard]] double distance() const noexcept { return distance_; }
   [[nodiscard]] bool found() const noexcept { return place_.frame.face != no_index; }
@@ -296,7 +296,7 @@ class NearestSearch {
 
   void visit(std::uint32_t face) noexcept {
     ReliefPlace here;
-    here.frame = surface_.frame(face);
+    here.frame = surface_.frame(face, moment_);
     const int leaf = leaf_level(here.frame);
     Part stack[stack_capacity];
     int top = 0;
@@ -365,6 +365,7 @@ class NearestSearch {
 
   const ReliefSurface& surface_;
   Vec3 p_;
+  CoatMoment moment_;
   double distance_;
   ReliefPlace place_;
   ReliefPoint point_;
@@ -392,7 +393,7 @@ SweptHit ReliefSurface::first_met(const Segment& motion, Sides sides, Hint& hint
   // Nearly all motions are far shorter than a face: the neighbourhood decides.
   base_.index().for_each_along(motion, reach_, [&](std::uint32_t face) {
     if (skip(face)) return best.t;
-    const ReliefFrame here = frame(face);
+    const ReliefFrame here = frame(face, hint.moment);
     const PatchHit hit = PatchRay(*this, here, motion, sides).first(best.t);
     if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
       best.hit = true;
@@ -452,12 +453,13 @@ void ReliefSurface::contacts(const Vec3& position, double radius, Sides, Hint& h
 }
 
 Foot ReliefSurface::closest(const Vec3& p, double bound, Hint& hint) const noexcept {
-  NearestSearch search(*this, p, bound);
-  if (hint.relief.frame.owner == base_.index().identity()) search.descend_from(hint.relief);
+  NearestSearch search(*this, p, bound, hint.moment);
+  const ReliefPlace& last = hint.relief;
+  if (holds(last.frame, last.frame.face, hint.moment)) search.descend_from(last);
   if (!search.found() && bound == infinity) {
     const Foot base = base_.closest(p, infinity, hint);
     if (!base.found()) return {};
-    search.descend_from({frame(base.element), base.barycentric[1], base.barycentric[2]});
+    search.descend_from({frame(base.element, hint.moment), base.barycentric[1], base.barycentric[2]});
   }
   if (search.distance() == infinity) return {};
   Box around;

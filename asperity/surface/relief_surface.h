@@ -40,7 +40,8 @@ struct ReliefReport {
 ///
 /// Over each triangle x is a smooth function of the barycentric coordinates; neighbours share directions and, through
 /// stitching, heights, so that the surface is closed wherever the base is. All queries are about that surface. On an
-/// open base the relief ends at the rim.
+/// open base the relief ends at the rim. A coat may have levels of detail and change with time: queries are about the
+/// moment that the hint tells.
 class ReliefSurface {
  public:
   /// Errors: bad_mesh (a relief that folds over, when `settings` refuse that), naming faces, vertices and the largest
@@ -48,6 +49,16 @@ class ReliefSurface {
   static Result<ReliefSurface> build(MeshSurface base, Coat coat, const ReliefSettings& settings = {});
   /// The same with the default settings, which cannot fail. [build]
   ReliefSurface(MeshSurface base, Coat coat);
+  /// The same coat, asked for in the same way, on the base after its vertices moved (DeformableMesh): shell, bands and
+  /// room for the heights are found anew. Mappings go by places (triplanar, solid) of the mesh that the coat was laid
+  /// on, so that nothing swims. Errors: mismatch (a base of another lineage), bad_mesh as build. [build]
+  [[nodiscard]] Result<ReliefSurface> moved(MeshSurface base) const;
+  /// The mesh that the coat was laid on: what Coat::frame is asked with. [servo]
+  [[nodiscard]] const TriangleMesh& rest_mesh() const noexcept { return rest_.mesh(); }
+  /// Coat::sample on this surface: mapped by the mesh that the coat was laid on, gradient and normal in the plane of
+  /// the face as it lies now. [servo]
+  [[nodiscard]] CoatSample coat_sample(std::uint32_t face, const Vec3& barycentric,
+                                       const CoatMoment& moment = {}) const noexcept;
 
   /// First point of a motion where a ball of `radius` touches. A point's is exact: no relief, however thin, is stepped
   /// over. A ball moves in steps of half its radius, each checked at its end. [servo]
@@ -66,7 +77,13 @@ class ReliefSurface {
   [[nodiscard]] Box bounds() const noexcept { return base_.bounds().grown(reach_); }
 
   /// What evaluating the relief over `face` needs. [servo]
-  [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept;
+  [[nodiscard]] ReliefFrame frame(std::uint32_t face, const CoatMoment& moment = {}) const noexcept;
+  /// Tells reliefs apart, never 0: whose places and frames a hint holds. [any]
+  [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
+  /// Whether a frame is this surface's own, of the face and the moment. [servo]
+  [[nodiscard]] bool holds(const ReliefFrame& frame, std::uint32_t face, const CoatMoment& moment) const noexcept {
+    return frame.owner == identity_ && frame.face == face && frame.coat.moment == moment;
+  }
   /// Height as rendered over a place of the frame's triangle. [servo]
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
   /// The displaced surface over it. [servo]
@@ -94,6 +111,9 @@ class ReliefSurface {
   [[nodiscard]] bool overlapped(std::uint32_t face) const noexcept {
     return !overlapped_.empty() && overlapped_[face] != 0;
   }
+  /// Folds `fillet`: the least radius that a fillet has anywhere (m): 0 where a convex fold ends; 0 in other modes.
+  /// [any]
+  [[nodiscard]] double least_fillet() const noexcept;
   /// How far the displaced surface is from its base at most (m). [any]
   [[nodiscard]] double reach() const noexcept { return reach_; }
   /// Bytes of coat, base, search structure and shell. [any]
@@ -101,6 +121,9 @@ class ReliefSurface {
 
  private:
   [[nodiscard]] SweptHit ball_segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
+  ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest);
+  /// Does what the settings ask beyond the default.
+  Status settle(const ReliefSettings& settings);
   template <class Skip>
   [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, Hint& hint, const Skip& skip) const noexcept;
   void fit(ShellDirections directions);
@@ -108,19 +131,27 @@ class ReliefSurface {
   /// Per face: of the heights over it, the share that its prism has room for.
   [[nodiscard]] std::vector<double> fitting_shares() const;
   [[nodiscard]] double deepest_fold() const;
+  void lay_fillets();
+  [[nodiscard]] float band_to(std::uint32_t face, int edge) const noexcept;
   void lower(const std::vector<double>& share_of_face);
   void find_overlaps();
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
   template <class Visit>
   void for_each_partner(const ReliefFrame& frame, double u, double v, Visit&& visit) const noexcept;
 
+  std::uint64_t identity_ = 0;
   MeshSurface base_;
+  MeshSurface rest_;  ///< that the coat was laid on
   Coat coat_;
+  ReliefSettings settings_;
   Shell shell_;
   std::vector<StitchBand> bands_;         ///< one a face, or empty: nothing to stitch
+  std::vector<float> fillets_;            ///< one a vertex, or empty: radius of the ball in concave folds (m)
+  std::vector<float> fillet_reach_;       ///< one a vertex: 1 - its coordinate, up to which all faces around have a say
   std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
   std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
   ReliefReport report_;

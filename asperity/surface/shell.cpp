@@ -18,8 +18,10 @@ struct WeightedNormal {
   double weight;
 };
 
-std::vector<WeightedNormal> normals_around(const TriangleMesh& mesh, std::uint32_t vertex) {
-  std::vector<WeightedNormal> around;
+/// `normals`: of all faces. `around` is filled anew.
+void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const std::vector<Vec3>& normals,
+                         std::vector<WeightedNormal>& around) {
+  around.clear();
   for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
     const TriangleMesh::Triangle& corners = mesh.triangles()[face];
     std::size_t k = 0;
@@ -27,9 +29,8 @@ std::vector<WeightedNormal> normals_around(const TriangleMesh& mesh, std::uint32
     const Vec3& here = mesh.positions()[vertex];
     const Vec3 one = mesh.positions()[corners[(k + 1) % 3]] - here;
     const Vec3 other = mesh.positions()[corners[(k + 2) % 3]] - here;
-    around.push_back({mesh.face_normal(face), std::atan2(one.cross(other).norm(), one.dot(other))});
+    around.push_back({normals[face], std::atan2(one.cross(other).norm(), one.dot(other))});
   }
-  return around;
 }
 
 double least_normal_product(const std::vector<WeightedNormal>& around, const Vec3& direction) {
@@ -252,8 +253,11 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   std::vector<Vec3> directions(count);
   std::vector<std::vector<WeightedNormal>> around;
   if (how == ShellDirections::relaxed) around.resize(count);
+  std::vector<Vec3> normals(mesh.triangles().size());
+  for (std::uint32_t face = 0; face < normals.size(); ++face) normals[face] = mesh.face_normal(face);
+  std::vector<WeightedNormal> here;
   for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
-    std::vector<WeightedNormal> here = normals_around(mesh, vertex);
+    find_normals_around(mesh, vertex, normals, here);
     const Vec3 normal = mesh.vertex_normal(vertex);
     directions[vertex] = normal;
     if (!here.empty()) {
@@ -267,7 +271,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
       }
       directions[vertex] = direction;
     }
-    if (how == ShellDirections::relaxed) around[vertex] = std::move(here);
+    if (how == ShellDirections::relaxed) around[vertex] = here;
   }
   if (how == ShellDirections::relaxed) relax(mesh, around, directions);
   shell.directions.reserve(count);

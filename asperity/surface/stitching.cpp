@@ -81,6 +81,21 @@ Status validate(const Stitching& stitching) {
                  "rho",
                  "a width above 0, at most 1/3 of a triangle's height"};
   }
+  if (stitching.folds == FoldMode::fillet &&
+      !(stitching.fillet_radius > 0.0 && std::isfinite(stitching.fillet_radius))) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {:g} m", stitching.fillet_radius),
+                 {},
+                 "fillet_radius",
+                 "a radius above 0 m"};
+  }
+  if (!(stitching.most_rounding >= 0.0)) {
+    return Error{ErrorCode::bad_value,
+                 fmt::format("is {:g} m", stitching.most_rounding),
+                 {},
+                 "most_rounding",
+                 "a length of 0 m or more"};
+  }
   if (stitching.blend != Blend::image) return success();
   if (stitching.blend_map.size() < 2) {
     return Error{ErrorCode::bad_value,

@@ -2,6 +2,7 @@
 // How reliefs of neighbouring faces are joined: weights that sum to one over the faces around (formulation D3).
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "asperity/core/math.h"
@@ -19,8 +20,9 @@ enum class Blend { none, linear, s_shape, quintic, image };
 
 /// What the join does to the base mesh's own folds.
 enum class FoldMode {
-  keep,   ///< heights are blended, over the base's own folds, which stay
-  round,  ///< penetrations are blended: within the band the fold becomes round
+  keep,    ///< heights are blended, over the base's own folds, which stay
+  round,   ///< penetrations are blended: within the band the fold becomes round
+  fillet,  ///< concave folds get a fillet in place: a ball of `fillet_radius` rests on the faces; convex ones stay
 };
 
 /// How the reliefs of neighbouring faces are joined.
@@ -32,6 +34,12 @@ struct Stitching {
   /// neighbours.
   double rho = 0.05;
   std::vector<double> blend_map;  ///< Blend::image: weights at t = 0 … 1, at least two, each in 0 … 1
+  /// FoldMode::fillet: of the ball (m), above 0. Around a vertex whose folds need more room than half the band it is
+  /// smaller, and 0 where a convex fold ends.
+  double fillet_radius = 1e-3;
+  /// FoldMode::round: by how much (m) it may move the surface from the face's own height. Infinite: as far as the band
+  /// lets it; small where both faces describe the same surface, which makes searches near edges cheap.
+  double most_rounding = std::numeric_limits<double>::infinity();
 };
 
 /// Errors: bad_value naming the member and what would be accepted. [build]

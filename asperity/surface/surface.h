@@ -44,6 +44,7 @@ struct ParametricHint {
 /// never trusted, free to be thrown away. One per probe and instance. [servo]
 struct Hint {
   TrianglePatch patch;
+  CoatMoment moment;  ///< no cache: the state of a coat that the caller asks about
   ReliefPlace relief;
   IsoHint iso;
   SparseHint sparse;

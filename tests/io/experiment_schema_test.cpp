@@ -15,6 +15,7 @@
 
 #include "asperity/field/brick_file.h"
 #include "asperity/field/mesh_conversion.h"
+#include "asperity/io/gltf_material.h"
 #include "asperity/io/scene_json.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/volume_io.h"
@@ -161,6 +162,37 @@ struct Host {
 
 // Every kind of object, in as many variants as it takes for each of its keys to be read in one of them.
 const Host hosts[] = {
+    {"coat", "/surfaces/0/coat", R"({"surfaces":[{"mesh":"tiles.glb","coat":{"from":"gltf"}}]})"},
+    {"detail", "/surfaces/0/coat/detail",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","detail":{"kind":"low_pass"}}}]})"},
+    {"layer", "/surfaces/0/coat/layers/0",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","layers":[{"height_map":"map.png"}]}}]})"},
+    {"layer", "/surfaces/0/coat/layers/0",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png","layers":[{"height_map":"map.png"}]}}]})"},
+    {"layer", "/surfaces/0/coat/layers/0",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","layers":[{"solid":"waves"}]}}]})"},
+    {"layer", "/surfaces/0/coat/layers/0",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","layers":[{"solid":"rings"}]}}]})"},
+    {"layer", "/surfaces/0/coat/layers/0",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","layers":[{"solid":"noise"}]}}]})"},
+    {"material maps", "/surfaces/0/coat/maps",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","maps":{}}}]})"},
+    {"material map", "/surfaces/0/coat/maps/viscosity",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","maps":{"viscosity":{"image":"map.png","low":0,"high":1}}}}]})"},
+    {"lay map", "/surfaces/0/coat/maps/lay",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","maps":{"lay":{"image":"normal.png"}}}}]})"},
+    {"closing", "/surfaces/0/coat/closing",
+     R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":2,"rows":2},"coat":{"height_map":"map.png","mapping":"triplanar","closing":{"texels":4}}}]})"},
+    {"library relief", "/surfaces/0/coat/height_map",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"library":"linen","size":16}}}]})"},
+    {"stitching", "/surfaces/0/coat/stitching",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png","stitching":{"folds":"fillet"}}}]})"},
+    {"motion", "/surfaces/0/motion", R"({"surfaces":[{"mesh":{"generator":"box"},"motion":{}}]})"},
+    {"view", "/view", R"({"surfaces":[{"mesh":{"generator":"box"}}],"view":{}})"},
+    {"camera", "/view/camera", R"({"surfaces":[{"mesh":{"generator":"box"}}],"view":{"camera":{}}})"},
+    {"change", "/change", R"({"surfaces":[{"mesh":{"generator":"box"}}],"change":{}})"},
+    {"law", "/surfaces/0/law",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png"},"law":{"type":"mesostructure-literal"}}]})"},
     {"scene", "", R"({"surfaces":[{"mesh":{"generator":"box"}}]})"},
     {"probe", "/probe", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{}})"},
     {"ideal probe", "/probe/ideal", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{"ideal":{}}})"},
@@ -294,6 +326,12 @@ const Host hosts[] = {
 TEST_F(ExperimentSchema, EveryKeyIsReallyRead) {
   if (!has_mesh_voxelizer()) GTEST_SKIP() << "without OpenVDB nothing implicit is read";
   ASSERT_TRUE(write_sparse(folder_ / "ball.vdb", *testing::sparse_ball(0.003, 0.012)).ok());
+  GltfMaterial tiles;
+  tiles.name = "tiles";
+  tiles.height = GltfHeight{};
+  tiles.height->texture.image = std::make_shared<const Image>(ramp(4, 4));
+  tiles.height->amplitude = 1e-3;
+  ASSERT_TRUE(write_gltf(folder_ / "tiles.glb", plane_grid(0.08, 0.08, 1, 1), {}, std::span(&tiles, 1)).ok());
   write("path.csv", "time,x,y,z\n0,0,0.05,0\n1,0.01,0.05,0\n");
   write("cube.json", R"({"asperity_volume":1,"file":"cube.raw","size":[2,2,2],"type":"uint8","byte_order":"little"})");
   write("cube.raw", std::string("\0\0\0\0\3\3\3\3", 8));

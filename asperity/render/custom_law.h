@@ -1,0 +1,171 @@
+#pragma once
+// A force law of one's own: a type with one function, which answers what a probe feels of a surface.
+
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "asperity/core/named_numbers.h"
+#include "asperity/core/units.h"
+#include "asperity/render/scene.h"
+
+namespace asperity {
+
+struct ContactState;
+struct LawForce;
+
+/// What a law of one's own answers, object frame.
+struct CustomForce {
+  bool contact = false;              ///< false: nothing is felt, the rest is not read
+  Vec3 force = Vec3::Zero();         ///< N
+  Vec3 point = Vec3::Zero();         ///< felt place of the surface (m)
+  Vec3 normal = Vec3::Zero();        ///< unit, the way that the surface pushes
+  double penetration = 0.0;          ///< m
+  double height = 0.0;               ///< relief height under the probe (m), where there is one
+  std::uint32_t element = no_index;  ///< face, cell or patch
+  /// The force has its damping already; otherwise the material's is added along the normal, and never pulls.
+  bool damped = false;
+};
+
+/// The surface that a law touches, object frame, whatever kind it is. [servo]
+class TouchedSurface {
+ public:
+  TouchedSurface(const Instance& instance, ContactState& slot) noexcept : instance_(&instance), slot_(&slot) {}
+  /// Signed value and gradient: below 0 inside; a distance on meshes, and to first order elsewhere. [servo]
+  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
+  /// The nearest point within `bound` (m). [servo]
+  [[nodiscard]] Foot closest(const Vec3& p, double bound) const noexcept;
+  [[nodiscard]] Sides sides() const noexcept { return instance_->sides; }
+  /// What it is, for laws of one kind of surface. [servo]
+  [[nodiscard]] const Surface& surface() const noexcept { return instance_->surface; }
+
+ private:
+  const Instance* instance_;
+  ContactState* slot_;
+};
+
+/// Largest size of what a law may remember, one for each probe and instance (bytes).
+inline constexpr std::size_t custom_state_size = 64;
+
+/// What a type that is a law may remember: its State, or nothing.
+template <class T>
+struct CustomStateOf {
+  struct type {};
+};
+/// The same where it has one.
+template <class T>
+requires requires {
+  typename T::State;
+}
+struct CustomStateOf<T> {
+  using type = typename T::State;
+};
+
+/// Whether a type answers forces from its State.
+template <class T>
+concept StatefulForceLaw = requires(const T& law, const TouchedSurface& surface, const Material& material,
+                                    const Vec3& v, Seconds dt, typename CustomStateOf<T>::type& state) {
+  { law.force(surface, material, v, v, dt, state) }
+  noexcept->std::same_as<CustomForce>;
+};
+/// Whether it answers them without one.
+template <class T>
+concept PlainForceLaw = requires(const T& law, const TouchedSurface& surface, const Material& material, const Vec3& v,
+                                 Seconds dt) {
+  { law.force(surface, material, v, v, dt) }
+  noexcept->std::same_as<CustomForce>;
+};
+/// Whether a type answers forces, with its State or without one:
+///   CustomForce force(const TouchedSurface&, const Material&, const Vec3& probe, const Vec3& velocity, Seconds dt[,
+///                     State&]) const noexcept
+/// `probe` (m) and `velocity` (m/s) in the object frame, `material` as it is there, `dt` since the last call. It may
+/// have, const: `bool fits(const Surface&)`, which surfaces it can be felt on (default: all), and `Status validate()`,
+/// whether its numbers are right.
+template <class T>
+concept ForceLaw = StatefulForceLaw<T> || PlainForceLaw<T>;
+
+/// A law that a program has added. Immutable; its state is in ContactState. A force that is not finite counts as none.
+class CustomLaw {
+ public:
+  /// Keeps `law` under a name. Errors: those of its validate(). [build]
+  template <ForceLaw T>
+  static Result<CustomLaw> build(T law, std::string name = "custom") {
+    using State = typename CustomStateOf<T>::type;
+    static_assert(std::is_trivially_copyable_v<State> && std::is_default_constructible_v<State>);
+    static_assert(sizeof(State) <= custom_state_size, "a law may remember 64 bytes");
+    if constexpr (requires { law.validate(); }) {
+      if (Status valid = law.validate(); !valid) return std::move(valid).error();
+    }
+    CustomLaw made(std::move(name));
+    made.law_ = std::make_shared<const T>(std::move(law));
+    made.reset_ = [](std::byte* bytes) noexcept {
+      const State state{};
+      std::memcpy(bytes, &state, sizeof(State));
+    };
+    made.force_ = [](const void* own, const TouchedSurface& surface, const Material& material, const Vec3& probe,
+                     const Vec3& velocity, Seconds dt, std::byte* bytes) noexcept {
+      const T& self = *static_cast<const T*>(own);
+      if constexpr (requires(State & s) { self.force(surface, material, probe, velocity, dt, s); }) {
+        State state;
+        std::memcpy(&state, bytes, sizeof(State));
+        const CustomForce answer = self.force(surface, material, probe, velocity, dt, state);
+        std::memcpy(bytes, &state, sizeof(State));
+        return answer;
+      } else {
+        return self.force(surface, material, probe, velocity, dt);
+      }
+    };
+    if constexpr (requires(const Surface& s) { law.fits(s); })
+      made.fits_ = [](const void* own, const Surface& surface) {
+        return bool(static_cast<const T*>(own)->fits(surface));
+      };
+    return made;
+  }
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  /// The numbers that it was made from, as scene files have them. [any]
+  [[nodiscard]] const NamedNumbers& numbers() const noexcept { return numbers_; }
+  /// The same law, said to be made from these. [build]
+  [[nodiscard]] CustomLaw made_from(NamedNumbers numbers) const {
+    CustomLaw law = *this;
+    law.numbers_ = std::move(numbers);
+    return law;
+  }
+  [[nodiscard]] bool fits(const Surface& surface) const { return fits_ == nullptr || fits_(law_.get(), surface); }
+  /// Asks it once; `slot` keeps its state, which starts anew with another law. [servo]
+  [[nodiscard]] LawForce force(const Instance& instance, const Material& material, const Vec3& probe,
+                               const Vec3& velocity, Seconds dt, ContactState& slot) const noexcept;
+
+ private:
+  explicit CustomLaw(std::string name);
+
+  std::shared_ptr<const void> law_;
+  void (*reset_)(std::byte* bytes) noexcept = nullptr;
+  CustomForce (*force_)(const void* law, const TouchedSurface& surface, const Material& material, const Vec3& probe,
+                        const Vec3& velocity, Seconds dt, std::byte* bytes) noexcept = nullptr;
+  bool (*fits_)(const void* law, const Surface& surface) = nullptr;
+  std::string name_;
+  NamedNumbers numbers_;
+  std::uint64_t identity_ = 0;
+};
+
+/// Makes a law of the numbers in a scene file.
+using CustomLawFactory = std::function<Result<CustomLaw>(NamedNumbers& numbers)>;
+
+/// Makes a law known to law_by_name, scene files and `compare --laws`. To be called before scenes are read, by one
+/// thread. Errors: bad_value (no plain name, a name that is taken). [build]
+Status register_custom_law(std::string name, CustomLawFactory factory);
+/// The same for a type that is made from its numbers: T(NamedNumbers&). [build]
+template <ForceLaw T>
+Status register_custom_law(const std::string& name) {
+  return register_custom_law(name, [name](NamedNumbers& numbers) { return CustomLaw::build(T(numbers), name); });
+}
+/// Every registered law. [any]
+const std::vector<std::string>& custom_law_names();
+/// A registered law made from `numbers`. Errors: bad_value (unknown), bad_key (a number that it does not read), and the
+/// factory's own. [build]
+Result<Law> make_custom_law(std::string_view name, NamedNumbers numbers);
+
+}  // namespace asperity

@@ -1,0 +1,423 @@
+// Surfaces and laws of one's own under `step`: the same invariants as of those that are built in.
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cstring>
+
+#include "asperity/geometry/generators.h"
+#include "asperity/render/custom_law.h"
+#include "tests/render/fixtures.h"
+#include "tests/surface/custom_fields.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+template <class Field>
+Surface surface_of(Field field) {
+  return std::make_shared<const CustomSurface>(must(CustomSurface::build(std::move(field))));
+}
+
+Surface parametric_ball(double radius) {
+  ParametricSettings settings;
+  settings.shape = ParametricShape::sphere;
+  settings.radius = radius;
+  return std::make_shared<const ParametricSurface>(must(ParametricSurface::build(settings)));
+}
+
+Surface floor_mesh() {
+  return std::make_shared<const MeshSurface>(
+      TriangleIndex::build(must(TriangleMesh::build(plane_grid(0.2, 0.2, 8, 8)))));
+}
+
+Instance instance_of(Surface surface, Sides sides = Sides::front, double friction = 0.0) {
+  Instance instance;
+  instance.name = "test";
+  instance.surface = std::move(surface);
+  instance.sides = sides;
+  instance.material.stiffness = stiffness;
+  instance.material.static_friction = friction;
+  instance.material.dynamic_friction = 0.8 * friction;
+  return instance;
+}
+
+// --- Surfaces -------------------------------------------------------------------------------------------------------
+
+TEST(CustomSurfaceProxy, PushesAsTheFormulaSays) {
+  for (const double radius : {0.0, 0.004}) {
+    const Scene scene = must(Scene::build({instance_of(surface_of(SmoothBall{}))}, radius));
+    const Vec3 out = Vec3(1.0, 2.0, -1.5).normalized();
+    const double depth = 1.5e-3;
+    const Vec3 place = (0.03 + radius - depth) * out;
+    const ForceSample felt = poke(scene, 0.05 * out, place);
+    EXPECT_LT((felt.wrench.force - stiffness * depth * out).norm(), 1e-4) << radius;
+    EXPECT_LT((felt.contact.point - 0.03 * out).norm(), 2e-5);
+    EXPECT_TRUE(felt.flags.has(TickFlag::contact));
+  }
+}
+
+TEST(CustomSurfaceProxy, SlidesLikeTheParametricSphere) {
+  for (const double friction : {0.0, 0.3}) {
+    const Scene own = must(Scene::build({instance_of(surface_of(Ball{}), Sides::front, friction)}, 0.0));
+    const Scene other = must(Scene::build({instance_of(parametric_ball(0.03), Sides::front, friction)}, 0.0));
+    std::vector<Vec3> path;
+    for (int i = 0; i <= 800; ++i) path.emplace_back(0.029 * Vec3(std::sin(2e-3 * i), 0.1, std::cos(2e-3 * i)));
+    const std::vector<Vec3> mine = slide(own, path, Vec3(1.3 * path.front()));
+    const std::vector<Vec3> theirs = slide(other, path, Vec3(1.3 * path.front()));
+    for (std::size_t i = 0; i < path.size(); ++i)
+      ASSERT_LT((mine[i] - theirs[i]).norm(), 0.01 * theirs[i].norm() + 1e-3) << friction << " at " << i;
+  }
+}
+
+TEST(CustomSurfaceProxy, ForceStaysInTheConeOfFriction) {
+  const double friction = 0.4;
+  const Scene scene = must(Scene::build({instance_of(surface_of(Torus{}), Sides::front, friction)}, 0.0));
+  ProxyState state;
+  touch(scene, state, Vec3(0.03, 0.0, 0.02));
+  for (int i = 0; i < 600; ++i) {
+    const ForceSample felt = touch(scene, state, Vec3(0.03 * std::cos(5e-3 * i), 0.03 * std::sin(5e-3 * i), 0.009));
+    ASSERT_TRUE(felt.flags.has(TickFlag::contact)) << i;
+    const Vec3 normal = Vec3::UnitZ();
+    const double push = felt.wrench.force.dot(normal);
+    EXPECT_GT(push, 0.0);
+    EXPECT_LE((felt.wrench.force - push * normal).norm(), friction * push * 1.02 + 1e-3) << i;
+  }
+}
+
+TEST(CustomSurfaceProxy, BothSidesHoldFromWithin) {
+  const Vec3 inside(0.0, 0.0, 0.028);
+  const Vec3 outside(0.0, 0.0, 0.032);
+  const Scene both = must(Scene::build({instance_of(surface_of(Ball{}), Sides::both)}, 0.0));
+  EXPECT_NEAR(poke(both, inside, outside).wrench.force.z(), -stiffness * 2e-3, 1e-3);
+  EXPECT_NEAR(poke(both, outside, inside).wrench.force.z(), stiffness * 2e-3, 1e-3);
+  const Scene front = must(Scene::build({instance_of(surface_of(Ball{}), Sides::front)}, 0.0));
+  EXPECT_EQ(poke(front, inside, outside).wrench.force.norm(), 0.0);
+  EXPECT_NEAR(poke(front, outside, inside).wrench.force.z(), stiffness * 2e-3, 1e-3);
+}
+
+/// A probe that wanders about, in steps of up to `stride` (m) a coordinate, kept within a ball.
+class Wanderer {
+ public:
+  Wanderer(std::uint64_t seed, double stride, double within) : state_(seed), stride_(stride), within_(within) {}
+  Vec3 next(const Vec3& from) {
+    Vec3 to = from + stride_ * Vec3(share(), share(), share());
+    if (to.norm() > within_) to *= within_ / to.norm();
+    return to;
+  }
+
+ private:
+  double share() {
+    state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state_ >> 11U) * (2.0 / 9007199254740992.0) - 1.0;
+  }
+  std::uint64_t state_;
+  double stride_;
+  double within_;
+};
+
+template <class Field>
+void expect_never_through(const Field& field, Sides sides, double radius, double stride, const Vec3& start) {
+  const Scene scene = must(Scene::build({instance_of(surface_of(field), sides, 0.2)}, radius));
+  const double side = field.eval(start).value < 0.0 ? -1.0 : 1.0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Wanderer wanderer(seed, stride, 0.027);
+    ProxyState state;
+    Vec3 probe = start;
+    int touching = 0;
+    for (int i = 0; i < 400; ++i) {
+      touching += touch(scene, state, probe).flags.has(TickFlag::contact) ? 1 : 0;
+      ASSERT_GT(side * field.eval(state.proxy).value, 0.0) << "seed " << seed << ", tick " << i;
+      probe = wanderer.next(probe);
+    }
+    EXPECT_GT(touching, 20);
+  }
+}
+
+TEST(CustomSurfaceProxy, NeverGetsThroughAGyroid) {
+  const GyroidSheet field;
+  for (const double radius : {0.0, 1e-3}) {
+    expect_never_through(field, Sides::both, radius, 1.5e-3, Vec3(0.005, 0.0, 0.0));
+    expect_never_through(field, Sides::both, radius, 8e-3, Vec3(0.005, 0.0, 0.0));
+  }
+}
+
+TEST(CustomSurfaceProxy, NeverGetsIntoATorus) {
+  for (const double radius : {0.0, 2e-3})
+    expect_never_through(Torus{}, Sides::front, radius, 5e-3, Vec3(0.0, 0.0, 0.0));
+}
+
+TEST(CustomSurfaceProxy, ForceIsContinuousAlongASuperquadric) {
+  const Scene scene = must(Scene::build({instance_of(surface_of(Superquadric{}))}, 0.0));
+  // Over a rounded edge, 1 mm deep at its sides, in steps of 10 um.
+  std::vector<Vec3> path;
+  for (int i = 0; i <= 2000; ++i) {
+    const double angle = 0.4 + 4e-4 * i;
+    const Vec3 way(std::cos(angle), 0.0, std::sin(angle));
+    const double far = 0.02 / (Superquadric{}.eval(way).value + 0.02);
+    path.emplace_back((far - 1e-3) * way);
+  }
+  const std::vector<Vec3> forces = slide(scene, path, 2.0 * path.front());
+  // Sides bend over no less than 5 mm and the probe is 1 mm deep.
+  EXPECT_LT(largest_jump(forces), stiffness * 6.0 * 1.7e-5);
+  for (const Vec3& force : forces) EXPECT_GT(force.norm(), 0.1);
+}
+
+TEST(CustomSurfaceProxy, ClosedPathsGiveNoEnergy) {
+  for (const double friction : {0.0, 0.3}) {
+    const Scene scene = must(Scene::build({instance_of(surface_of(Torus{}), Sides::front, friction)}, 0.0));
+    std::vector<Vec3> loop;
+    for (int i = 0; i < 1000; ++i) {
+      const double angle = 6.283185307179586 * i / 1000.0;
+      loop.emplace_back(0.03 + 0.006 * std::cos(angle), 0.004 * std::sin(angle), 0.006);
+    }
+    // The first time around friction takes hold; afterwards it only takes.
+    std::vector<Vec3> twice = loop;
+    twice.insert(twice.end(), loop.begin(), loop.end());
+    const std::vector<Vec3> forces = slide(scene, twice, Vec3(0.036, 0.0, 0.02));
+    double work = 0.0;
+    double moved = 0.0;
+    for (std::size_t i = loop.size(); i < twice.size(); ++i) {
+      work += 0.5 * (forces[i] + forces[i - 1]).dot(twice[i] - twice[i - 1]);
+      moved += std::abs(forces[i].dot(twice[i] - twice[i - 1]));
+    }
+    EXPECT_LT(work, 1e-3 * moved);
+    if (friction > 0.0) {
+      EXPECT_LT(work, -1e-4);
+    }
+  }
+}
+
+TEST(CustomSurfaceProxy, RestsBetweenItAndAMesh) {
+  // A ball of 30 mm stands on the floor; the probe is pressed into the wedge where they meet.
+  Instance ball = instance_of(surface_of(Ball{}));
+  ball.world_from_object.position = Vec3(0.0, 0.0, 0.03);
+  const Instance floor = instance_of(floor_mesh(), Sides::both);
+  const double radius = 2e-3;
+  const Scene scene = must(Scene::build({ball, floor}, radius));
+  ProxyState state;
+  touch(scene, state, Vec3(0.04, 0.0, 0.01));
+  const double wedge = 2.0 * std::sqrt(0.03 * radius);  // from where the ball stands: touching both
+  ForceSample felt;
+  for (int i = 0; i <= 200; ++i) {
+    const double t = i / 200.0;
+    felt = touch(scene, state, Vec3(0.04 + t * (wedge - 2e-3 - 0.04), 0.0, 0.01 + t * (radius - 1e-3 - 0.01)));
+    ASSERT_GT(state.proxy.z(), radius * 0.999) << i;
+    ASSERT_GT((state.proxy - Vec3(0.0, 0.0, 0.03)).norm(), (0.03 + radius) * 0.999) << i;
+  }
+  EXPECT_EQ(felt.contact.count, 2U);
+  EXPECT_NEAR(state.proxy.x(), wedge, 5e-5);
+  EXPECT_NEAR(state.proxy.z(), radius, 2e-5);
+}
+
+TEST(CustomSurfaceProxy, OtherLawsAreRefused) {
+  for (const char* law : {"god-object", "mesostructure", "avila", "virtual-contact-point"}) {
+    Instance instance = instance_of(surface_of(Ball{}));
+    instance.law = named(law);
+    const Result<Scene> scene = Scene::build({instance}, 0.0);
+    ASSERT_FALSE(scene.ok()) << law;
+    EXPECT_EQ(scene.error().code, ErrorCode::unsupported_pair) << law;
+    EXPECT_EQ(scene.error().place, "surfaces[0].law");
+  }
+}
+
+// --- Laws -----------------------------------------------------------------------------------------------------------
+
+/// F = stiffness depth^exponent of its own along the gradient, on what has a signed value.
+struct Power {
+  double exponent = 2.0;
+  double scale = 1e5;
+  bool damped = false;
+  [[nodiscard]] CustomForce force(const TouchedSurface& surface, const Material&, const Vec3& probe, const Vec3&,
+                                  Seconds) const noexcept {
+    CustomForce answer;
+    const FieldSample field = surface.eval(probe);
+    if (!(field.value < 0.0)) return answer;
+    answer.contact = true;
+    answer.normal = field.gradient.normalized();
+    answer.penetration = -field.value;
+    answer.force = scale * std::pow(-field.value, exponent) * answer.normal;
+    answer.point = probe - field.value * answer.normal;
+    answer.element = field.element;
+    answer.damped = damped;
+    return answer;
+  }
+};
+
+/// Counts its own ticks and pushes up with as many newtons.
+struct Counting {
+  struct State {
+    double ticks = 0.0;
+    std::uint64_t more[7] = {1, 2, 3, 4, 5, 6, 7};
+  };
+  [[nodiscard]] CustomForce force(const TouchedSurface&, const Material&, const Vec3& probe, const Vec3&, Seconds,
+                                  State& state) const noexcept {
+    CustomForce answer;
+    state.ticks += 1.0;
+    bool intact = true;
+    for (std::uint64_t i = 0; i < 7; ++i) intact = intact && state.more[i] == i + 1;
+    answer.contact = true;
+    answer.normal = Vec3::UnitZ();
+    answer.force = Vec3(0.0, 0.0, intact ? state.ticks : -1.0);
+    answer.point = probe;
+    return answer;
+  }
+};
+
+template <class T>
+Law law_of(T law, const char* name = "mine") {
+  return std::make_shared<const CustomLaw>(must(CustomLaw::build(std::move(law), name)));
+}
+
+TEST(CustomLaw, ItsForceIsRenderedOnEveryKindOfSurface) {
+  const std::vector<Surface> surfaces = {
+      surface_of(Ball{}), parametric_ball(0.03),
+      std::make_shared<const MeshSurface>(TriangleIndex::build(must(TriangleMesh::build(icosphere(5, 0.03)))))};
+  const Vec3 out = Vec3(0.2, -0.5, 1.0).normalized();
+  for (const Surface& surface : surfaces) {
+    SCOPED_TRACE(surface_kind(surface));
+    Instance instance = instance_of(surface);
+    instance.law = law_of(Power{});
+    instance.world_from_object.position = Vec3(0.1, 0.0, 0.0);
+    const Scene scene = must(Scene::build({instance}, 0.0));
+    const Vec3 origin = instance.world_from_object.position;
+    const double depth = 2e-3;
+    const ForceSample felt = poke(scene, origin + 0.05 * out, origin + (0.03 - depth) * out);
+    // The mesh is a polyhedron within the ball.
+    EXPECT_NEAR(felt.wrench.force.dot(out), 1e5 * depth * depth, 0.02);
+    EXPECT_EQ(felt.contact.count, 1U);
+    EXPECT_EQ(law_name(instance.law), "mine");
+    EXPECT_EQ(poke(scene, origin + 0.05 * out, origin + 0.031 * out).wrench.force.norm(), 0.0);
+  }
+}
+
+TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
+  Instance instance = instance_of(surface_of(Ball{}));
+  instance.law = law_of(Counting{});
+  const Scene scene = must(Scene::build({instance}, 0.0));
+  ProxyState first;
+  ProxyState second;
+  for (int i = 1; i <= 5; ++i)
+    EXPECT_EQ(touch(scene, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), static_cast<double>(i));
+  EXPECT_EQ(touch(scene, second, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 1.0);
+  // A copy goes on from where it was taken: what replays rest on.
+  ProxyState copy = first;
+  EXPECT_EQ(touch(scene, copy, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 6.0);
+  EXPECT_EQ(touch(scene, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 6.0);
+  // Another law, though of the same type, starts anew.
+  instance.law = law_of(Counting{});
+  const Scene next = must(Scene::build({instance}, 0.0));
+  const double force = touch(next, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z();
+  EXPECT_LE(force, 2.0);
+}
+
+TEST(CustomLaw, MaterialsDampingAndFrictionComeOnTop) {
+  const auto felt = [](bool damped, double damping, bool friction) {
+    Instance instance = instance_of(surface_of(Ball{}), Sides::front, friction ? 0.5 : 0.0);
+    Power law;
+    law.damped = damped;
+    instance.law = law_of(law);
+    instance.material.damping = damping;
+    instance.material.friction_named = friction;
+    const Scene scene = must(Scene::build({instance}, 0.0));
+    ProxyState state;
+    ForceSample out;
+    for (int i = 0; i <= 100; ++i) {
+      ProbeSample probe = probe_at(Vec3(1e-5 * i, 0.0, 0.028));
+      probe.twist.linear = Vec3(0.01, 0.0, -0.02);
+      out = step(scene, state, probe, tick);
+    }
+    return out;
+  };
+  const double plain = felt(false, 0.0, false).wrench.force.z();
+  EXPECT_NEAR(plain, 0.4, 0.01);
+  EXPECT_NEAR(felt(false, 5.0, false).wrench.force.z() - plain, 0.1, 0.01);
+  EXPECT_NEAR(felt(true, 5.0, false).wrench.force.z(), plain, 1e-12);
+  const ForceSample rough = felt(false, 0.0, true);
+  EXPECT_LT(rough.wrench.force.x(), -0.05);
+  EXPECT_LE(rough.parts.friction.norm(), 0.5 * plain * 1.01);
+}
+
+TEST(CustomLaw, ForcesThatAreNoNumbersAreNone) {
+  Power law;
+  law.scale = std::nan("");
+  Instance instance = instance_of(surface_of(Ball{}));
+  instance.law = law_of(law);
+  const Scene scene = must(Scene::build({instance}, 0.0));
+  const ForceSample felt = poke(scene, Vec3(0.0, 0.0, 0.04), Vec3(0.0, 0.0, 0.029));
+  EXPECT_TRUE(felt.wrench.force.isZero(0.0));
+  EXPECT_FALSE(felt.flags.has(TickFlag::contact));
+}
+
+TEST(CustomLaw, TwoRunsAreEqualToTheBit) {
+  Instance instance = instance_of(surface_of(GyroidSheet{}), Sides::both);
+  instance.law = law_of(Power{});
+  const Scene scene = must(Scene::build({instance}, 0.0));
+  std::vector<Vec3> path;
+  Wanderer wanderer(5, 1e-3, 0.027);
+  path.emplace_back(0.005, 0.0, 0.0);
+  for (int i = 0; i < 500; ++i) path.push_back(wanderer.next(path.back()));
+  const std::vector<Vec3> first = slide(scene, path);
+  const std::vector<Vec3> second = slide(scene, path);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    ASSERT_EQ(std::memcmp(first[i].data(), second[i].data(), 3 * sizeof(double)), 0);
+    largest = std::max(largest, first[i].norm());
+  }
+  EXPECT_GT(largest, 0.0);
+}
+
+/// A law for meshes alone, whose number has to be above 0.
+struct Picky : Power {
+  explicit Picky(NamedNumbers& numbers) { scale = numbers.get("scale", 100.0); }
+  [[nodiscard]] Status validate() const {
+    if (scale > 0.0) return success();
+    return Error{ErrorCode::bad_value, fmt_scale(), {}, "scale", "above 0"};
+  }
+  [[nodiscard]] bool fits(const Surface& surface) const { return base_of(surface) != nullptr; }
+  [[nodiscard]] std::string fmt_scale() const { return "is " + std::to_string(scale); }
+};
+
+TEST(CustomLaw, RegisteredLawsHaveTheirNameAndTheirNumbers) {
+  ASSERT_TRUE(register_custom_law<Picky>("picky").ok());
+  const Law law = must(law_by_name("picky"));
+  EXPECT_EQ(law_name(law), "picky");
+  EXPECT_FALSE(constrains(law));
+  EXPECT_DOUBLE_EQ(custom_of(law)->numbers().taken().at("scale"), 100.0);
+  const Law scaled = must(make_custom_law("picky", NamedNumbers({{"scale", 7.0}})));
+  EXPECT_DOUBLE_EQ(custom_of(scaled)->numbers().taken().at("scale"), 7.0);
+
+  const Result<Law> bad = make_custom_law("picky", NamedNumbers({{"scale", -1.0}}));
+  ASSERT_FALSE(bad.ok());
+  EXPECT_EQ(bad.error().place, "scale");
+  const Result<Law> unread = make_custom_law("picky", NamedNumbers({{"scall", 1.0}}));
+  ASSERT_FALSE(unread.ok());
+  EXPECT_EQ(unread.error().code, ErrorCode::bad_key);
+  const Result<Law> near = law_by_name("pickY-");
+  ASSERT_FALSE(near.ok());
+  EXPECT_NE(near.error().what.find("did you mean \"picky\"?"), std::string::npos) << near.error().what;
+  EXPECT_NE(near.error().accepted.find("picky"), std::string::npos);
+  for (const char* taken : {"picky", "proxy", "mesostructure-literal", "Proxy", "a+b", ""})
+    EXPECT_FALSE(register_custom_law<Picky>(taken).ok()) << taken;
+}
+
+TEST(CustomLaw, ScenesRefuseWhatItDoesNotFit) {
+  NamedNumbers numbers;
+  Instance instance = instance_of(surface_of(Ball{}));
+  instance.law = law_of(Picky(numbers), "of-meshes");
+  const Result<Scene> refused = Scene::build({instance}, 0.0);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::unsupported_pair);
+  EXPECT_NE(refused.error().what.find("of-meshes"), std::string::npos);
+  instance.surface = floor_mesh();
+  EXPECT_TRUE(Scene::build({instance}, 0.0).ok());
+  const Result<Scene> ball = Scene::build({instance}, 1e-3);
+  ASSERT_FALSE(ball.ok());
+  EXPECT_EQ(ball.error().code, ErrorCode::unsupported_pair);
+  instance.law = std::shared_ptr<const CustomLaw>();
+  EXPECT_FALSE(Scene::build({instance}, 0.0).ok());
+}
+
+}  // namespace
+}  // namespace asperity

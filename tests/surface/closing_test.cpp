@@ -1,0 +1,222 @@
+// Closing of concave folds: formulation D4 and T7, hrm-2010 4.2.
+
+#include "asperity/surface/closing.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/surface/folded.h"
+
+namespace asperity {
+namespace {
+
+using namespace test;
+
+struct Closed {
+  std::shared_ptr<const ReliefSurface> open;
+  ClosedRelief maps;
+  ReliefSurface surface;
+};
+
+Closed closed(std::shared_ptr<const ReliefSurface> open, double radius, int texels = 0) {
+  ClosedRelief maps = must(close_relief(*open, {radius, texels}));
+  ReliefSurface surface = must(wear_closed(*open, maps));
+  return {std::move(open), std::move(maps), std::move(surface)};
+}
+
+void expect_fillet(double opening_degrees, double height, double radius, double side, int texels) {
+  SCOPED_TRACE(opening_degrees);
+  const double opening = degrees(opening_degrees);
+  const Closed valley_closed =
+      closed(coated(valley(opening, side), flat_map(height), Mapping::triplanar), radius, texels);
+  const ReliefSurface& surface = valley_closed.surface;
+  const double tangent = radius / std::tan(0.5 * opening);
+  Rng rng(7);
+  double worst = 0.0;
+  int round = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const std::uint32_t face = random_face(rng, surface.base().mesh());
+    const Vec3 barycentric = random_barycentric(rng);
+    const Vec3 p = surface.point(surface.frame(face), barycentric[1], barycentric[2]).position;
+    // Where the sheet ends the ball comes in from beside it.
+    if (std::abs(p.y()) > 0.5 * side - radius) continue;
+    worst = std::max(worst, off_fillet(p, opening, height, radius));
+    const double along = std::sin(0.5 * opening) * std::abs(p.x()) + std::cos(0.5 * opening) * p.z();
+    if (along < tangent && valley_closed.maps.rise_at(face, barycentric) > 0.0) ++round;
+  }
+  EXPECT_LE(worst, 1e-3 * radius);
+  EXPECT_GT(round, 100);
+  const ClosingReport& report = valley_closed.maps.report;
+  EXPECT_EQ(report.unsettled_texels, 0U) << report.summary();
+  // Along the fold's ray, in shell heights: those are 1 / sin of half the opening times as long.
+  const double rise = radius * (1.0 - std::sin(0.5 * opening));
+  EXPECT_GE(report.largest_rise, 0.6 * rise);
+  EXPECT_LE(report.largest_rise, 1.4 * rise) << "rays beside the fold meet the fillet later than the fold's own";
+}
+
+TEST(Closing, a_fold_between_planes_gets_a_fillet_of_exactly_the_radius) {
+  expect_fillet(150.0, 0.3e-3, 2e-3, 6e-3, 28);
+  expect_fillet(120.0, 0.0, 2e-3, 6e-3, 28);
+  expect_fillet(90.0, 0.3e-3, 2e-3, 6e-3, 28);
+  expect_fillet(60.0, 0.0, 2e-3, 6e-3, 28);
+}
+
+TEST(Closing, also_between_planes_at_30_degrees) {
+  expect_fillet(30.0, 0.0, 1e-3, 6e-3, 48);
+}
+
+/// A profile across x: a smooth wave with a narrow groove and a pit in it (m).
+double profile(double x) {
+  const auto dip = [&](double at, double width, double depth) {
+    const double t = (x - at) / width;
+    return -depth * std::exp(-t * t);
+  };
+  return 0.1e-3 * std::cos(2.0 * std::numbers::pi * x / 8e-3) + dip(-1.5e-3, 0.25e-3, 0.5e-3) +
+         dip(1.4e-3, 0.6e-3, 0.6e-3);
+}
+
+TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their_profile) {
+  constexpr double width = 8e-3;
+  constexpr double radius = 1e-3;
+  const auto open = coated(plane_grid(width, width, 1, 1),
+                           map_of(
+                               128, [&](double s, double) { return profile((s - 0.5) * width); }, Wrap::clamp),
+                           Mapping::uv, width);
+  const Closed result = closed(open, radius, 96);
+  // Greyscale closing of the profile, sampled every 4 um: dilation by the disc, then erosion.
+  constexpr double step = 4e-6;
+  const int count = static_cast<int>(width / step) + 1;
+  const int reach = static_cast<int>(radius / step);
+  Hint hint;
+  std::vector<double> height;
+  for (int i = 0; i < count; ++i) {
+    const double x = -0.5 * width + i * step;
+    const Foot foot = open->base().closest(Vec3(x, 1e-3, 0.0), infinity, hint);
+    height.push_back(open->height(open->frame(foot.element), foot.barycentric[1], foot.barycentric[2]).height);
+  }
+  std::vector<double> cap;
+  for (int k = -reach; k <= reach; ++k) cap.push_back(std::sqrt(radius * radius - k * k * step * step));
+  const auto swept = [&](const std::vector<double>& from, double sign) {
+    std::vector<double> to;
+    for (int i = 0; i < count; ++i) {
+      double best = -infinity;
+      for (int k = std::max(-reach, -i); k <= std::min(reach, count - 1 - i); ++k) {
+        best = std::max(best, sign * from[static_cast<std::size_t>(i + k)] + cap[static_cast<std::size_t>(k + reach)]);
+      }
+      to.push_back(sign * best);
+    }
+    return to;
+  };
+  const std::vector<double> right = swept(swept(height, 1.0), -1.0);
+  double worst = 0.0;
+  double deepest = 0.0;
+  for (int i = count / 6; i < 5 * count / 6; i += 7) {
+    const double x = -0.5 * width + i * step;
+    const Foot foot = result.surface.base().closest(Vec3(x, 1e-3, 0.0), infinity, hint);
+    const ReliefFrame frame = result.surface.frame(foot.element);
+    const double felt = result.surface.height(frame, foot.barycentric[1], foot.barycentric[2]).height;
+    const auto k = static_cast<std::size_t>(i);
+    worst = std::max(worst, std::abs(felt - right[k]));
+    deepest = std::max(deepest, right[k] - height[k]);
+  }
+  EXPECT_GT(deepest, 0.3e-3);
+  EXPECT_LE(worst, 2e-3 * radius);
+  EXPECT_EQ(result.maps.report.unsettled_texels, 0U);
+}
+
+TEST(Closing, what_the_ball_reaches_everywhere_keeps_its_height) {
+  const auto open = coated(icosphere(1, 0.02), wavy_map(0.05e-3, 16), Mapping::triplanar, 0.02);
+  const Closed result = closed(open, 1e-3, 24);
+  EXPECT_EQ(result.maps.report.changed_texels, 0U) << result.maps.report.summary();
+  EXPECT_EQ(result.maps.report.largest_rise, 0.0);
+  Rng rng(3);
+  for (int i = 0; i < 500; ++i) {
+    const std::uint32_t face = random_face(rng, open->base().mesh());
+    const Vec3 b = random_barycentric(rng, 0.05);
+    ASSERT_NEAR(result.surface.height(result.surface.frame(face), b[1], b[2]).height,
+                open->height(open->frame(face), b[1], b[2]).height, 1e-6);
+  }
+}
+
+/// A cup of few faces with rings, peaks and holes: folds, grooves and pits at once.
+std::shared_ptr<const ReliefSurface> ringed_cup() {
+  MesostructureSpec spec;
+  spec.kind = MesostructureKind::rings;
+  spec.size = 128;
+  spec.amplitude = 0.8e-3;
+  spec.seed = 3;
+  return coated(trial_mesh_e(2, std::numbers::pi / 2.0, 0.01),
+                must(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline)), Mapping::uv);
+}
+
+/// Of places of a surface farther than `radius` from its rim: the least share of `radius` that is free around the
+/// centre of a ball that touches.
+double least_freedom(const ReliefSurface& surface, double radius, std::uint64_t seed, int count) {
+  Rng rng(seed);
+  double least = 1.0;
+  Hint hint;
+  for (int i = 0; i < count; ++i) {
+    const std::uint32_t face = random_face(rng, surface.base().mesh());
+    Vec3 b = random_barycentric(rng);
+    if (i % 2 == 0) b[static_cast<int>(rng.below(3))] *= 0.1;
+    b /= b.sum();
+    const ReliefPoint point = surface.point(surface.frame(face), b[1], b[2]);
+    if (point.position.z() > -1.5 * radius) continue;
+    const Foot foot = surface.closest(point.position + radius * point.normal(), 1.01 * radius, hint);
+    if (foot.found()) least = std::min(least, foot.distance / radius);
+  }
+  return least;
+}
+
+TEST(T7_closing, outside_the_closed_cup_no_point_nearer_than_the_radius_has_two_feet) {
+  // The ball that touches a place is free if and only if nothing between has a second foot.
+  const double radius = 1.5e-3;
+  const auto open = ringed_cup();
+  EXPECT_LT(least_freedom(*open, radius, 5, 150), 0.9) << "the open cup has such points";
+  const Closed result = closed(open, radius, 40);
+  EXPECT_GT(result.maps.report.changed_texels, 1000U);
+  EXPECT_LE(result.maps.report.unsettled_texels * 500, result.maps.report.texels);
+  for (const double share : {0.3, 0.7, 0.95})
+    EXPECT_GT(least_freedom(result.surface, share * radius, 11, 100), 0.99) << share;
+}
+
+TEST(Closing, the_report_counts_what_the_picture_shows) {
+  const auto open = ringed_cup();
+  const Closed result = closed(open, 1.5e-3, 24);
+  const ClosingReport& report = result.maps.report;
+  EXPECT_EQ(result.maps.rise.size(), result.maps.atlas.heights.size());
+  float highest = 0.0F;
+  for (const float rise : result.maps.rise) highest = std::max(highest, rise);
+  EXPECT_GE(static_cast<double>(highest), 0.999 * report.largest_rise);
+  EXPECT_GT(report.changed_share, 0.01);
+  EXPECT_LT(report.changed_share, 0.9);
+  EXPECT_TRUE(std::is_sorted(report.changed_faces.begin(), report.changed_faces.end()));
+  EXPECT_TRUE(std::binary_search(report.changed_faces.begin(), report.changed_faces.end(), report.largest_face));
+  EXPECT_NE(report.summary().find("face " + std::to_string(report.largest_face)), std::string::npos);
+}
+
+void expect_refused(const ClosingSettings& settings, ErrorCode code, std::string_view place) {
+  static const auto open = coated(valley(degrees(90.0), 5e-3), flat_map(0.0), Mapping::triplanar);
+  const auto answer = close_relief(*open, settings);
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, code);
+  EXPECT_EQ(answer.error().place, place);
+  EXPECT_FALSE(answer.error().accepted.empty());
+}
+
+TEST(Closing, refuses_what_it_cannot_do) {
+  for (const double radius : {0.0, -1e-3, std::nan(""), 1.0}) expect_refused({radius}, ErrorCode::bad_value, "radius");
+  for (const int texels : {-1, 1, 513}) expect_refused({1e-3, texels}, ErrorCode::bad_value, "texels");
+  expect_refused({1e-6}, ErrorCode::too_large, "radius");
+  expect_refused({1e-3, 0, 1000}, ErrorCode::too_large, "radius");
+  const auto one = coated(valley(degrees(90.0), 5e-3), flat_map(0.0), Mapping::triplanar);
+  const ClosedRelief maps = must(close_relief(*one, {1e-3, 4}));
+  const auto other = coated(valley(degrees(90.0), 5e-3, 2), flat_map(0.0), Mapping::triplanar);
+  const auto worn = wear_closed(*other, maps);
+  ASSERT_FALSE(worn);
+  EXPECT_EQ(worn.error().code, ErrorCode::mismatch);
+}
+
+}  // namespace
+}  // namespace asperity
