@@ -12,6 +12,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "asperity/field/detail_pyramid.h"
 #include "asperity/field/mesostructure_generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/step.h"
@@ -307,6 +308,72 @@ TEST(FineTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
         expect_clean(name.c_str(), 1500, 0.0, [&](int) -> const Scene& { return scene; });
       }
     }
+  }
+}
+
+/// A sphere of 30 mm in a coat of all that a coat may have, moving and turning, seen and felt larger.
+Scene changing_scene(const Law& law, double zoom, double height) {
+  static const auto base = MeshSurface(TriangleIndex::build(TriangleMesh::build(icosphere(3, 0.03)).value()));
+  MesostructureSpec spec;
+  spec.kind = MesostructureKind::rings;
+  spec.size = 64;
+  spec.amplitude = height;
+  const HeightMap heights = generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline).value();
+  const Vec2 tile(0.01, 0.01);
+  const auto detail =
+      std::make_shared<const DetailPyramid>(DetailPyramid::build(heights, tile, {DetailKind::low_pass}).value());
+  CoatParts parts;
+  parts.maps.push_back(
+      std::make_shared<const Mesostructure>(Mesostructure::build(heights, tile).value().with_detail(detail)));
+  SolidSpec waves;
+  waves.kind = SolidKind::waves;
+  waves.frequency = 3.0;
+  SolidSpec noise;
+  noise.drift = Vec3(1e-3, 0.0, 0.0);
+  for (const SolidSpec& solid : {waves, noise}) {
+    CoatLayer layer;
+    layer.solid = std::make_shared<const SolidMesostructure>(SolidMesostructure::build(solid).value());
+    parts.layers.push_back(layer);
+  }
+  const auto values = [&](float low, float high) {
+    return std::make_shared<const HeightMap>(
+        HeightMap::build(std::vector<float>{low, high}, 2, 1, Wrap::repeat, Reconstruction::bilinear).value());
+  };
+  MaterialMaps::Parts maps;
+  maps.channels = {values(500.0F, 900.0F), values(0.0F, 2.0F),     values(0.0F, 2.0F),
+                   values(0.5F, 1.0F),     values(100.0F, 300.0F), nullptr};
+  maps.lay_s = values(0.0F, 0.5F);
+  maps.lay_t = values(0.2F, 0.0F);
+  parts.materials = std::make_shared<const MaterialMaps>(MaterialMaps::build(std::move(maps)).value());
+  CoatSettings laid;
+  laid.mapping = Mapping::triplanar;
+  Instance instance;
+  instance.name = "sphere";
+  instance.law = law;
+  instance.sides = Sides::front;
+  instance.material.damping = 1.0;
+  instance.material.static_friction = instance.material.dynamic_friction = 0.3;
+  instance.material.stickiness = std::holds_alternative<ProxyLaw>(law) ? 0.1 : 0.0;
+  instance.motion.velocity.angular = Vec3(0.0, 0.5, 0.1);
+  instance.motion.horizon = Seconds(100.0);
+  instance.surface =
+      std::make_shared<const ReliefSurface>(base, Coat::build(base.mesh(), std::move(parts), laid).value());
+  SceneSettings settings;
+  settings.view.zoom = zoom;
+  settings.view.camera.pixels = 500;
+  settings.change_power = 0.01;
+  return Scene::build({instance}, settings).value();
+}
+
+TEST(ChangeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
+#if defined(ASPERITY_SANITIZED)
+  GTEST_SKIP() << "sanitizers replace the same functions";
+#endif
+  for (const char* name : {"proxy", "mesostructure", "height-field"}) {
+    const Law law = law_by_name(name).value();
+    const std::vector<Scene> scenes{changing_scene(law, 1.0, 2e-4), changing_scene(law, 1.1, 2e-4),
+                                    changing_scene(law, 1.0, 4e-4)};
+    expect_clean(name, 3000, 0.0, [&](int i) -> const Scene& { return scenes[static_cast<std::size_t>(i / 100) % 3]; });
   }
 }
 
