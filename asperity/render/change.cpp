@@ -92,7 +92,11 @@ bool carry_on_relief(const Instance& instance, const ReliefSurface& relief, Cont
   const bool same = relief.holds(place.frame, place.frame.face, slot.hint.moment);
   if (same && same_pose(slot.pose, slot.pose_before)) return false;
   if (!same) {
-    if (slot.lineage == 0 || slot.lineage != lineage_of(instance)) return false;
+    if (slot.lineage == 0 || slot.lineage != lineage_of(instance)) {
+      // Another surface: what was held is not a place of it.
+      slot.touching = false;
+      return false;
+    }
     place.frame = relief.frame(place.frame.face, slot.hint.moment);
     slot.point = relief.point(place.frame, place.u, place.v);
   }

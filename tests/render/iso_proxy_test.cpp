@@ -320,8 +320,8 @@ TEST(IsoProxy, AThresholdChangedUnderTheProbeMovesTheSurfaceAtItsSpeed) {
         most = std::max(most, out.wrench.force.norm());
         last = out.wrench.force;
       }
-      // 20 mm/s on 1 N/mm.
-      EXPECT_LT(jump, 1.05 * 1000.0 * 0.02 * dt) << target;
+      // 20 mm/s on 1 N/mm, and the first of its ticks handed over within the next ten milliseconds.
+      EXPECT_LT(jump, 1.12 * 1000.0 * 0.02 * dt) << target;
       if (target < 0.0292) {
         EXPECT_FALSE(out.flags.has(TickFlag::contact));
       } else {

@@ -334,8 +334,12 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
     touch(before, state, probe);
     const double tank = state.tank.level();
     EXPECT_GT(tank, 1e-3);
-    const ForceSample felt = touch(after, state, probe);
-    EXPECT_FALSE(felt.flags.has(TickFlag::energy_limited));
+    ForceSample felt;
+    // Handed over within 10 ms.
+    for (int i = 0; i < 300; ++i) {
+      felt = touch(after, state, probe);
+      EXPECT_FALSE(felt.flags.has(TickFlag::energy_limited));
+    }
     EXPECT_LT(state.tank.level(), tank);
     EXPECT_NEAR(felt.wrench.force.norm(), 3.0 * stiffness * (felt.proxy - probe).norm(), 1e-9);
   }
