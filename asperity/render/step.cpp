@@ -253,8 +253,8 @@ void add_to_proxy(const Instance& instance, double share, const ProbeSample& pro
   const Vec3 touched = slot.pose.apply_inverse(law.point);
   const Material local = maps ? local_material(instance, touched, slot.hint) : instance.material;
   add_viscosity(local.viscosity, velocity_over(instance, slot, probe), law);
-  if (has_moved(slot)) limit_drag(slot, law.point, tank, law);
   if (!adds && instance.fine == nullptr) {
+    if (has_moved(slot)) limit_drag(slot, law.point, tank, law);
     if (law.contact && instance.material.static_friction > 0.0 && proxy_holds_friction(instance))
       law.friction = law.force - law.force.dot(law.normal) * law.normal;
     return;
