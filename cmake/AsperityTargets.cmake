@@ -24,10 +24,11 @@ if(ASPERITY_SANITIZE)
 endif()
 
 # asperity_module(NAME DEPENDS modules... LIBRARIES public... PRIVATE private...)
-# A library from every .cpp in the current folder, with the alias asperity::NAME.
+# A library from every .cpp in the current folder and in its detail/, with the alias asperity::NAME. Headers in detail/
+# are the module's own: no other module includes them, and they are not installed.
 function(asperity_module name)
   cmake_parse_arguments(arg "" "" "DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp" "${CMAKE_CURRENT_SOURCE_DIR}/detail/*.cpp")
   add_library(asperity_${name} STATIC ${sources})
   add_library(asperity::${name} ALIAS asperity_${name})
   set_target_properties(asperity_${name} PROPERTIES EXPORT_NAME ${name})

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "asperity/field/brick_pool.h"
+#include "asperity/field/detail/brick_pool.h"
 
 namespace asperity {
 namespace {

@@ -2,7 +2,7 @@
 #include <bitset>
 #include <cmath>
 
-#include "asperity/field/conversion_signs.h"
+#include "asperity/field/detail/conversion_signs.h"
 #include "asperity/geometry/closest_point.h"
 
 namespace asperity::conversion {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <queue>
 
-#include "asperity/field/conversion_signs.h"
+#include "asperity/field/detail/conversion_signs.h"
 
 namespace asperity::conversion {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
-#include "asperity/field/spline_prefilter.h"
-#include "asperity/field/texel_coordinate.h"
+#include "asperity/field/detail/spline_prefilter.h"
+#include "asperity/field/detail/texel_coordinate.h"
 
 namespace asperity {
 namespace {

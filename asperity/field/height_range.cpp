@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "asperity/core/math.h"
-#include "asperity/field/texel_coordinate.h"
+#include "asperity/field/detail/texel_coordinate.h"
 
 namespace asperity {
 namespace {

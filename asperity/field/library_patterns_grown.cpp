@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "asperity/field/library_patterns.h"
-#include "asperity/field/tiled_noise.h"
+#include "asperity/field/detail/library_patterns.h"
+#include "asperity/field/detail/tiled_noise.h"
 
 namespace asperity {
 namespace {

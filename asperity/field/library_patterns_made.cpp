@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string_view>
 
-#include "asperity/field/library_patterns.h"
-#include "asperity/field/tiled_noise.h"
+#include "asperity/field/detail/library_patterns.h"
+#include "asperity/field/detail/tiled_noise.h"
 
 namespace asperity {
 namespace {

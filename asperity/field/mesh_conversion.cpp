@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "asperity/field/conversion_signs.h"
+#include "asperity/field/detail/conversion_signs.h"
 
 namespace asperity {
 namespace {

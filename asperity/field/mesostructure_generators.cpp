@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "asperity/field/mesostructure_formulas.h"
+#include "asperity/field/detail/mesostructure_formulas.h"
 
 namespace asperity {
 namespace {

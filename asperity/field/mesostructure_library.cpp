@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "asperity/core/suggest.h"
-#include "asperity/field/library_patterns.h"
+#include "asperity/field/detail/library_patterns.h"
 
 namespace asperity {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/field/texel_coordinate.h"
+#include "asperity/field/detail/texel_coordinate.h"
 
 namespace asperity {
 namespace {

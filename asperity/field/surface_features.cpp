@@ -11,7 +11,7 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/core/suggest.h"
-#include "asperity/field/texel_coordinate.h"
+#include "asperity/field/detail/texel_coordinate.h"
 
 namespace asperity {
 namespace {

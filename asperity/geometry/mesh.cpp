@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "asperity/geometry/face_measures.h"
+#include "asperity/geometry/detail/face_measures.h"
 #include "asperity/geometry/index_table.h"
 
 namespace asperity {

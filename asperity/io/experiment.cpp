@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "asperity/io/scene_fine.h"
+#include "asperity/io/detail/scene_fine.h"
 
 namespace asperity {
 namespace {

@@ -2,9 +2,9 @@
 #include <fmt/ranges.h>
 
 #include "asperity/core/suggest.h"
+#include "asperity/io/detail/scene_json.h"
 #include "asperity/io/embedded_file.h"
 #include "asperity/io/experiment.h"
-#include "asperity/io/scene_json.h"
 
 namespace asperity {
 namespace {

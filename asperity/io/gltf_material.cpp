@@ -11,9 +11,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "asperity/io/gltf_looks.h"
+#include "asperity/io/detail/gltf_looks.h"
+#include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/image_io.h"
-#include "asperity/io/mesh_readers.h"
 
 namespace asperity {
 namespace {

@@ -9,9 +9,9 @@
 #include <map>
 #include <set>
 
-#include "asperity/io/gltf_document.h"
-#include "asperity/io/gltf_looks.h"
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/gltf_document.h"
+#include "asperity/io/detail/gltf_looks.h"
+#include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity::mesh_readers {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "asperity/io/atomic_file.h"
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity {
 namespace {

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <limits>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity::mesh_readers {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <optional>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity::mesh_readers {
 namespace {

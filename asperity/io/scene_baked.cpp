@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/io/scene_fine.h"
+#include "asperity/io/detail/scene_fine.h"
 
 namespace asperity {
 namespace {

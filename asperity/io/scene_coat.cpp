@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/io/detail/scene_heights.h"
+#include "asperity/io/detail/scene_layers.h"
 #include "asperity/io/image_io.h"
-#include "asperity/io/scene_heights.h"
-#include "asperity/io/scene_layers.h"
 
 namespace asperity {
 namespace {

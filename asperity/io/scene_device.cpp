@@ -1,6 +1,6 @@
 // Device, hand and probe of a scene file.
 
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/detail/scene_reader.h"
 
 namespace asperity {
 namespace {

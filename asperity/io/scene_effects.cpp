@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/detail/scene_reader.h"
 
 namespace asperity {
 namespace {

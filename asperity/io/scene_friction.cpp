@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "asperity/io/scene_fine.h"
-#include "asperity/io/scene_heights.h"
+#include "asperity/io/detail/scene_fine.h"
+#include "asperity/io/detail/scene_heights.h"
 
 namespace asperity {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "asperity/io/detail/scene_layers.h"
 #include "asperity/io/gltf_material.h"
-#include "asperity/io/scene_layers.h"
 
 namespace asperity {
 namespace {

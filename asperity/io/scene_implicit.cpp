@@ -7,7 +7,7 @@
 
 #include "asperity/field/material_brush.h"
 #include "asperity/field/mesh_conversion.h"
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/surface/implicit_texture.h"
 

@@ -1,4 +1,4 @@
-#include "asperity/io/scene_json.h"
+#include "asperity/io/detail/scene_json.h"
 
 namespace asperity {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 
+#include "asperity/io/detail/scene_custom.h"
+#include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/image_io.h"
-#include "asperity/io/scene_custom.h"
-#include "asperity/io/scene_reader.h"
 #include "asperity/render/custom_law.h"
 
 namespace asperity {

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "asperity/geometry/generators.h"
+#include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/mesh_io.h"
-#include "asperity/io/scene_reader.h"
 
 namespace asperity {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "asperity/io/scene_fine.h"
+#include "asperity/io/detail/scene_fine.h"
 
 namespace asperity {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/recorded_path.h"
-#include "asperity/io/scene_reader.h"
 
 namespace asperity {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/io/detail/scene_custom.h"
+#include "asperity/io/detail/scene_fine.h"
+#include "asperity/io/detail/scene_layers.h"
 #include "asperity/io/gltf_material.h"
-#include "asperity/io/scene_custom.h"
-#include "asperity/io/scene_fine.h"
-#include "asperity/io/scene_layers.h"
 #include "asperity/surface/closing.h"
 
 namespace asperity {

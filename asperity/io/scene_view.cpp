@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/detail/scene_reader.h"
 
 namespace asperity {
 

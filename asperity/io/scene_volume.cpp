@@ -9,7 +9,7 @@
 
 #include "asperity/field/derived_fields.h"
 #include "asperity/field/volume_generators.h"
-#include "asperity/io/scene_reader.h"
+#include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/volume_io.h"
 
 namespace asperity {

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity::mesh_readers {
 namespace {

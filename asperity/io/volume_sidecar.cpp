@@ -11,8 +11,8 @@
 #include <iterator>
 #include <new>
 
-#include "asperity/io/scene_json.h"
-#include "asperity/io/volume_assembly.h"
+#include "asperity/io/detail/scene_json.h"
+#include "asperity/io/detail/volume_assembly.h"
 
 namespace asperity {
 namespace {

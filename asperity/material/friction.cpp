@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/material/friction_limits.h"
+#include "asperity/material/detail/friction_limits.h"
 
 namespace asperity {
 

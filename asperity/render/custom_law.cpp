@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "asperity/core/suggest.h"
-#include "asperity/render/iso_proxy.h"
+#include "asperity/render/detail/iso_proxy.h"
 
 namespace asperity {
 

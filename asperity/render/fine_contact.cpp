@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/render/coat_material.h"
+#include "asperity/render/detail/coat_material.h"
 
 namespace asperity {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "asperity/core/units.h"
-#include "asperity/render/coat_material.h"
 #include "asperity/render/custom_law.h"
+#include "asperity/render/detail/coat_material.h"
 #include "asperity/render/fine_contact.h"
 #include "asperity/surface/relief_mesh.h"
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/render/change.h"
-#include "asperity/render/coat_material.h"
 #include "asperity/render/custom_law.h"
+#include "asperity/render/detail/change.h"
+#include "asperity/render/detail/coat_material.h"
+#include "asperity/render/detail/iso_proxy.h"
+#include "asperity/render/detail/proxy_tick.h"
 #include "asperity/render/fine_contact.h"
-#include "asperity/render/iso_proxy.h"
-#include "asperity/render/proxy_tick.h"
 
 namespace asperity {
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "asperity/io/atomic_file.h"
-#include "asperity/study/page.h"
+#include "asperity/study/detail/page.h"
 
 namespace asperity {
 namespace {

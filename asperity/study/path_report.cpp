@@ -8,7 +8,7 @@
 
 #include "asperity/core/units.h"
 #include "asperity/io/atomic_file.h"
-#include "asperity/study/page.h"
+#include "asperity/study/detail/page.h"
 
 namespace asperity {
 namespace {

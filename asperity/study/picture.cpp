@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "asperity/io/image_io.h"
-#include "asperity/study/camera.h"
-#include "asperity/study/ray_cast.h"
-#include "asperity/study/shading.h"
-#include "asperity/study/stroke_layer.h"
+#include "asperity/study/detail/camera.h"
+#include "asperity/study/detail/ray_cast.h"
+#include "asperity/study/detail/shading.h"
+#include "asperity/study/detail/stroke_layer.h"
 
 namespace asperity {
 namespace {

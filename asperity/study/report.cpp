@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "asperity/io/atomic_file.h"
-#include "asperity/study/page.h"
-#include "asperity/study/page_data.h"
+#include "asperity/study/detail/page.h"
+#include "asperity/study/detail/page_data.h"
 
 namespace asperity {
 namespace {

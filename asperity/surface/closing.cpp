@@ -7,9 +7,9 @@
 #include <unordered_map>
 
 #include "asperity/core/fixed_vector.h"
-#include "asperity/surface/halfspaces.h"
+#include "asperity/surface/detail/halfspaces.h"
+#include "asperity/surface/detail/relief_weights.h"
 #include "asperity/surface/relief_descent.h"
-#include "asperity/surface/relief_weights.h"
 
 namespace asperity {
 

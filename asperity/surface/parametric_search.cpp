@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/surface/detail/parametric_shapes.h"
 #include "asperity/surface/parametric_descent.h"
-#include "asperity/surface/parametric_shapes.h"
 #include "asperity/surface/parametric_surface.h"
 
 namespace asperity {

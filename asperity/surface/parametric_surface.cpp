@@ -9,7 +9,7 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/core/units.h"
-#include "asperity/surface/parametric_shapes.h"
+#include "asperity/surface/detail/parametric_shapes.h"
 
 namespace asperity {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "asperity/core/fixed_vector.h"
-#include "asperity/surface/halfspaces.h"
-#include "asperity/surface/relief_partners.h"
+#include "asperity/surface/detail/halfspaces.h"
+#include "asperity/surface/detail/relief_partners.h"
 #include "asperity/surface/relief_surface.h"
 
 namespace asperity {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/surface/relief_partners.h"
+#include "asperity/surface/detail/relief_partners.h"
 #include "asperity/surface/relief_surface.h"
 
 namespace asperity {

@@ -43,6 +43,28 @@ TEST(Layers, ModulesIncludeOnlyModulesAboveThem) {
   }
 }
 
+// Headers in detail/ are not installed: an installed one that includes them would not compile.
+TEST(Layers, DetailIsTheModulesOwn) {
+  int seen = 0;
+  for (const SourceFile& file : files_below("", {".h", ".cpp"})) {
+    const bool of_a_module = file.path.compare(0, 9, "asperity/") == 0;
+    const bool of_tests = file.path.compare(0, 6, "tests/") == 0;
+    for (std::size_t i = 0; i < file.lines.size(); ++i) {
+      const std::string name = included(file.lines[i]);
+      const std::size_t detail = name.find("/detail/");
+      if (detail == std::string::npos || name.front() != '"') continue;
+      ++seen;
+      if (of_tests) continue;
+      const std::string folder = name.substr(1, detail);  // "asperity/MODULE/"
+      EXPECT_TRUE(of_a_module && file.path.compare(0, folder.size(), folder) == 0)
+          << file.path << ":" << i + 1 << ": " << name << " is another module's own";
+      const bool is_public = file.path.ends_with(".h") && file.path.find("/detail/") == std::string::npos;
+      EXPECT_FALSE(is_public) << file.path << ":" << i + 1 << ": " << name << " is not installed, this header is";
+    }
+  }
+  EXPECT_GT(seen, 40);
+}
+
 TEST(Layers, OutsideLibrariesStayInTheirPlaces) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> places = {{"<Eigen/", {"core"}},
                                                                                 {"<nlohmann/", {"io", "study"}},

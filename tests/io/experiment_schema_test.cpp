@@ -15,8 +15,8 @@
 
 #include "asperity/field/brick_file.h"
 #include "asperity/field/mesh_conversion.h"
+#include "asperity/io/detail/scene_json.h"
 #include "asperity/io/gltf_material.h"
-#include "asperity/io/scene_json.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/volume_io.h"
 #include "tests/field/sparse_grids.h"

@@ -1,5 +1,5 @@
 // Maps of the material on a coat, and what a view makes of touch.
-#include "asperity/render/coat_material.h"
+#include "asperity/render/detail/coat_material.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "asperity/render/constraint_solve.h"
+#include "asperity/render/detail/constraint_solve.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

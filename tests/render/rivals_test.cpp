@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/render/generated_geometry.h"
+#include "asperity/render/detail/generated_geometry.h"
 #include "tests/render/fixtures.h"
 #include "tests/render/oracle.h"
 

@@ -9,9 +9,9 @@
 
 #include "asperity/device/ideal_probe.h"
 #include "asperity/render/step.h"
+#include "asperity/study/detail/ray_cast.h"
 #include "asperity/study/metrics.h"
 #include "asperity/study/picture.h"
-#include "asperity/study/ray_cast.h"
 #include "asperity/study/report.h"
 #include "tests/render/volumes.h"
 #include "tests/study/synthetic.h"

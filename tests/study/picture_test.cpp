@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "asperity/io/image_io.h"
-#include "asperity/study/camera.h"
-#include "asperity/study/ray_cast.h"
+#include "asperity/study/detail/camera.h"
+#include "asperity/study/detail/ray_cast.h"
 #include "tests/study/synthetic.h"
 
 namespace asperity {

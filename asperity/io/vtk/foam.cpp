@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/vtk_data.h"
 
 namespace asperity::vtk_io {

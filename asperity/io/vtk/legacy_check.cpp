@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
 
 namespace asperity::vtk_io {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
 
 namespace asperity::vtk_io {

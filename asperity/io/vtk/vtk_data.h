@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "asperity/io/volume_assembly.h"
+#include "asperity/io/detail/volume_assembly.h"
 
 namespace asperity::vtk_io {
 

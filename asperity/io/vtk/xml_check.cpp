@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "asperity/io/mesh_readers.h"
+#include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
 #include "asperity/io/vtk/xml_scan.h"
 

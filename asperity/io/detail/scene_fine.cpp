@@ -1,0 +1,534 @@
+// Textures in a scene file: features, what they are mapped by, and what each is felt as.
+
+#include "asperity/io/detail/scene_fine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "asperity/io/detail/scene_heights.h"
+#include "asperity/io/texture_waves.h"
+
+namespace asperity {
+namespace {
+
+using std::numbers::pi;
+
+const std::vector<std::string>& formulation_names() {
+  static const std::vector<std::string> names{"literal", "consistent"};
+  return names;
+}
+const std::vector<std::string>& scale_names() {
+  static const std::vector<std::string> names{"auto", scale_name(FeatureScale::friction),
+                                              scale_name(FeatureScale::texture), scale_name(FeatureScale::shape)};
+  return names;
+}
+const std::vector<std::string>& mapping_names() {
+  static const std::vector<std::string> names{"plane", "cylinder", "sphere", "box", "uv"};
+  return names;
+}
+
+/// Lengths of one unit of u and of v where they are longest (m).
+Vec2 widest(const ParametricSurface& surface) {
+  constexpr int steps = 64;
+  Vec2 longest = Vec2::Zero();
+  for (int i = 0; i <= steps; ++i) {
+    for (int j = 0; j <= steps; ++j) {
+      const Vec2 share(static_cast<double>(i) / steps, static_cast<double>(j) / steps);
+      const ParametricJet jet = surface.jet(surface.lower() + share.cwiseProduct(surface.upper() - surface.lower()));
+      longest = longest.cwiseMax(Vec2(jet.u.norm(), jet.v.norm()));
+    }
+  }
+  return longest;
+}
+
+class MappingReader {
+ public:
+  MappingReader(const SceneJson* json, const std::string& place, const TextureHost& host)
+      : reader_(json == nullptr ? empty() : *json, place, "feature mapping"), host_(host) {}
+
+  Result<ScenePart<FeatureMapping>> read() {
+    const bool parametric = host_.parametric != nullptr;
+    settings_.surface =
+        static_cast<IntermediateSurface>(reader_.choice("surface", mapping_names(), parametric ? 4 : 0));
+    ASPERITY_CHECK(reader_.status());
+    refuse_others();
+    if (settings_.surface == IntermediateSurface::uv) {
+      read_tile();
+    } else {
+      read_frame();
+    }
+    ASPERITY_CHECK(reader_.status());
+    Result<FeatureMapping> mapping = FeatureMapping::build(settings_);
+    if (!mapping) return std::move(mapping).error().at(reader_.place());
+    return ScenePart<FeatureMapping>{std::move(*mapping), std::move(reader_.canonical())};
+  }
+
+ private:
+  static const SceneJson& empty() {
+    static const SceneJson object = SceneJson::object();
+    return object;
+  }
+
+  void refuse_others() {
+    const auto only_for = [&](bool mine, std::initializer_list<std::string_view> keys) {
+      if (!mine) reader_.refuse(keys, fmt::format("by the mapping \"{}\"", mapping_names()[index()]));
+    };
+    const IntermediateSurface surface = settings_.surface;
+    only_for(surface != IntermediateSurface::uv, {"origin", "axis", "reference"});
+    only_for(surface == IntermediateSurface::cylinder || surface == IntermediateSurface::sphere, {"radius"});
+    only_for(surface == IntermediateSurface::box, {"half_extent"});
+    only_for(surface == IntermediateSurface::uv, {"tile"});
+  }
+  [[nodiscard]] std::size_t index() const { return static_cast<std::size_t>(settings_.surface); }
+
+  void read_tile() {
+    Vec2 unit = Vec2::Ones();
+    if (host_.parametric != nullptr) {
+      unit = widest(*host_.parametric);
+    } else if (host_.mesh != nullptr && host_.mesh->has_uvs()) {
+      unit = Vec2::Constant(texture_unit(*host_.mesh));
+    } else {
+      reader_.fail("surface", "is \"uv\", and the surface has no texture coordinates",
+                   "\"plane\", \"cylinder\", \"sphere\" or \"box\"", ErrorCode::mismatch);
+    }
+    settings_.tile = reader_.pair("tile", Dimension::length, unit, Range::positive());
+  }
+
+  void read_frame() {
+    settings_.origin = reader_.lengths("origin", host_.bounds.centre());
+    settings_.axis = reader_.direction("axis", own_axis()).normalized();
+    // Along the coordinate axis that is farthest from the mapping's own.
+    const Vec3 along = std::abs(settings_.axis.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
+    const Vec3 wanted = reader_.direction("reference", along).normalized();
+    const Vec3 across = wanted - wanted.dot(settings_.axis) * settings_.axis;
+    if (across.norm() < 1e-3) {
+      reader_.fail("reference", "runs along the axis", "a direction at an angle to \"axis\"");
+      return;
+    }
+    settings_.reference = across.normalized();
+    const Vec3 extent = extent_along();
+    const Vec3 half = 0.5 * extent;
+    if (settings_.surface == IntermediateSurface::cylinder)
+      settings_.radius = reader_.quantity("radius", Dimension::length, std::max(half.x(), half.y()), Range::positive());
+    if (settings_.surface == IntermediateSurface::sphere)
+      settings_.radius = reader_.quantity("radius", Dimension::length, half.maxCoeff(), Range::positive());
+    if (settings_.surface == IntermediateSurface::box) settings_.half_extent = reader_.lengths("half_extent", half);
+  }
+
+  /// The middle of a sheet is looked at from above, and so is a vase.
+  [[nodiscard]] Vec3 own_axis() const {
+    if (host_.parametric != nullptr) return Vec3::UnitZ();
+    if (settings_.surface != IntermediateSurface::plane) return Vec3::UnitY();
+    constexpr double alike = 0.99;
+    const Vec3 extent = host_.bounds.extent();
+    int shortest = 1;
+    for (const int k : {2, 0}) {
+      if (extent[k] < alike * extent[shortest]) shortest = k;
+    }
+    return Vec3::Unit(shortest);
+  }
+
+  /// Of the bounds, along reference, axis x reference, axis.
+  [[nodiscard]] Vec3 extent_along() const {
+    const Vec3 edges[3] = {settings_.reference, settings_.axis.cross(settings_.reference), settings_.axis};
+    Vec3 extent;
+    for (int k = 0; k < 3; ++k) extent[k] = edges[k].cwiseAbs().dot(host_.bounds.extent());
+    return extent;
+  }
+
+  ObjectReader reader_;
+  const TextureHost& host_;
+  FeatureMappingSettings settings_;
+};
+
+/// One feature. `around`: length along u after which the mapping comes back (m), 0 where it does not.
+class FeatureReader {
+ public:
+  FeatureReader(const SceneJson& json, const std::string& place, double around, SceneContext& context)
+      : reader_(json, place, "feature"), around_(around), context_(context) {}
+
+  Result<SurfaceFeature> read() {
+    if (!reader_.failed() && !reader_.has("type")) reader_.fail("type", "is missing", "a feature's name");
+    const std::size_t kind = reader_.choice("type", feature_names(), 0);
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_TRY(spec_.kind, feature_by_name(feature_names()[kind]));
+    refuse_others();
+    if (takes("direction")) spec_.direction = reader_.quantity("direction", Dimension::angle, 0.0);
+    if (takes("heights")) ASPERITY_CHECK(read_heights());
+    if (takes("amplitude")) spec_.amplitude = required("amplitude");
+    if (takes("wavelength")) read_wavelength();
+    if (takes("phase")) spec_.phase = reader_.quantity("phase", Dimension::angle, 0.0);
+    if (takes("centre")) spec_.centre = reader_.pair("centre", Dimension::length, spec_.centre);
+    if (takes("wall")) spec_.wall = reader_.quantity("wall", Dimension::ratio, spec_.wall, Range{0.01, 0.5});
+    if (takes("roughness")) read_roughness();
+    if (takes("correlation_length")) spec_.correlation_length = required("correlation_length");
+    if (takes("seed")) spec_.seed = reader_.seed("seed", spec_.seed);
+    if (takes("period")) {
+      // What goes around comes back where it started.
+      spec_.period = reader_.pair("period", Dimension::length, Vec2(around_, 0.0), Range::not_negative());
+    }
+    ASPERITY_CHECK(reader_.status());
+    Result<SurfaceFeature> feature = SurfaceFeature::build(spec_);
+    if (!feature) return placed(std::move(feature).error());
+    return feature;
+  }
+
+  [[nodiscard]] ObjectReader& reader() { return reader_; }
+  /// An error of the feature, by the key that a scene writes.
+  [[nodiscard]] Error placed(Error error) const {
+    if (error.place == "kind") error.place = "type";
+    if (error.place == "heights") error.place = "height_map";
+    return std::move(error).at(reader_.place());
+  }
+
+ private:
+  [[nodiscard]] bool takes(std::string_view member) const {
+    const auto& taken = feature_parameters(spec_.kind);
+    return std::find(taken.begin(), taken.end(), member) != taken.end();
+  }
+
+  void refuse_others() {
+    static const std::vector<std::string> of_maps{"height_map", "channel",  "height", "height_range",
+                                                  "offset",     "white_is", "filter"};
+    for (const SceneObjectKeys& entry : scene_object_keys()) {
+      if (entry.object != "feature") continue;
+      for (const std::string& key : entry.keys) {
+        const bool of_map = std::find(of_maps.begin(), of_maps.end(), key) != of_maps.end();
+        const bool mine = key == "type" || key == "as" || (of_map && takes("heights")) ||
+                          (key == "count" && takes("wavelength")) ||
+                          (key == "average_roughness" && takes("roughness")) || takes(key);
+        if (!mine) reader_.refuse({key}, fmt::format("by the feature \"{}\"", feature_name(spec_.kind)));
+      }
+    }
+    if (around_ <= 0.0) reader_.refuse({"count"}, "by a mapping that does not go around (\"wavelength\" is)");
+  }
+
+  double required(const char* key) {
+    if (!reader_.has(key))
+      reader_.fail(key, "is missing", fmt::format("a length above 0 ({})", accepted_units(Dimension::length)));
+    return reader_.quantity(key, Dimension::length, 0.0, Range::positive());
+  }
+
+  /// R_q, or R_a of a Gaussian surface.
+  void read_roughness() {
+    if (!reader_.has("average_roughness")) {
+      spec_.roughness = required("roughness");
+      return;
+    }
+    reader_.refuse({"roughness"}, "beside average_roughness");
+    spec_.roughness = std::sqrt(0.5 * std::numbers::pi) * required("average_roughness");
+  }
+
+  void read_wavelength() {
+    const bool two = spec_.kind == FeatureKind::grid || spec_.kind == FeatureKind::map;
+    // One length keeps a map's pixels square.
+    const double second = spec_.heights ? static_cast<double>(spec_.heights->height()) / spec_.heights->width() : 1.0;
+    const SceneJson* given = reader_.raw("wavelength");
+    if (reader_.has("count")) {
+      reader_.refuse({"wavelength"}, "beside count");
+      const int count = reader_.integer("count", 1, 1, 1'000'000);
+      const double length = around_ * std::abs(std::cos(spec_.direction)) / count;
+      spec_.wavelength = Vec2(length, two ? second * length : 0.0);
+      reader_.canonical().erase("count");
+    } else if (given == nullptr && !(sidecar_size_.x() > 0.0)) {
+      reader_.fail(
+          "wavelength", "is missing",
+          fmt::format("{} above 0 ({}){}", two ? "one length or two" : "a length", accepted_units(Dimension::length),
+                      around_ > 0.0 ? ", or \"count\", how often it fits around" : ""));
+    } else if (given == nullptr) {
+      spec_.wavelength = sidecar_size_;
+    } else if (!two || !given->is_array()) {
+      const double length = reader_.quantity("wavelength", Dimension::length, 0.0, Range::positive());
+      spec_.wavelength = Vec2(length, two ? second * length : 0.0);
+    } else {
+      spec_.wavelength = reader_.pair("wavelength", Dimension::length, Vec2::Zero(), Range::positive());
+    }
+    if (two) {
+      reader_.write("wavelength", SceneJson::array({spec_.wavelength.x(), spec_.wavelength.y()}));
+    } else {
+      reader_.write("wavelength", spec_.wavelength.x());
+    }
+  }
+
+  Status read_heights() {
+    static const std::vector<std::string> filters{"nearest", "bilinear", "bspline"};
+    HeightSourceReader source(reader_, context_, "height_map", "feature", 0.0);
+    ASPERITY_CHECK(source.read_source());
+    ASPERITY_CHECK(source.read_scale(1.0));
+    const auto filter = static_cast<Reconstruction>(reader_.choice("filter", filters, 2));
+    ASPERITY_CHECK(reader_.status());
+    ASPERITY_TRY(HeightMap heights, source.build(Wrap::repeat, filter));
+    if (source.sidecar()) {
+      sidecar_size_ =
+          Vec2(source.sidecar()->pixel.x() * heights.width(), source.sidecar()->pixel.y() * heights.height());
+    }
+    spec_.heights = std::make_shared<const HeightMap>(std::move(heights));
+    return success();
+  }
+
+  ObjectReader reader_;
+  double around_ = 0.0;
+  SceneContext& context_;
+  FeatureSpec spec_;
+  Vec2 sidecar_size_ = Vec2::Zero();  ///< m, of one repeat as measured; 0: not known
+};
+
+class TextureReader {
+ public:
+  TextureReader(ObjectReader& surface, const TextureHost& host, const Law& law, SceneContext& context)
+      : reader_(*surface.raw("texture"), surface.place_of("texture"), "texture"),
+        coated_(surface.has("coat")),
+        host_(host),
+        law_(law),
+        context_(context),
+        scales_(feature_scales(context.device.position_resolution)) {}
+
+  Result<TexturePart> read() {
+    static const std::vector<std::string> sources{"features", "coat"};
+    ASPERITY_CHECK(reader_.status());
+    part_.given = true;
+    ASPERITY_TRY(ScenePart<FeatureMapping> mapping,
+                 MappingReader(reader_.raw("mapping"), reader_.place_of("mapping"), host_).read());
+    part_.fine.mapping = std::move(mapping.value);
+    reader_.write("mapping", std::move(mapping.canonical));
+    part_.fine.source = static_cast<TextureSource>(reader_.choice("source", sources, 0));
+    part_.fine.formulation = static_cast<Formulation>(reader_.choice("formulation", formulation_names(), 1));
+    ASPERITY_CHECK(reader_.status());
+    if (part_.fine.source == TextureSource::coat) {
+      check_coat();
+    } else {
+      as_ = reader_.choice("as", scale_names(), 0);
+      ASPERITY_CHECK(reader_.status());
+      ASPERITY_CHECK(read_features());
+    }
+    ASPERITY_CHECK(reader_.status());
+    return std::move(part_);
+  }
+
+  [[nodiscard]] ObjectReader& reader() { return reader_; }
+
+ private:
+  void check_coat() {
+    reader_.refuse({"features", "as"}, "where the coat is the source");
+    if (!coated_ || host_.mesh == nullptr) {
+      reader_.fail("source", "is \"coat\", and the surface has none", "\"features\", or a mesh with a coat",
+                   ErrorCode::unsupported_pair);
+    } else if (!std::holds_alternative<GodObjectLaw>(law_)) {
+      // It would be felt twice (formulation, amendment 8).
+      reader_.fail("source", fmt::format("is \"coat\", whose relief the law \"{}\" feels already", law_name(law_)),
+                   "\"features\", or the law \"god-object\", which feels the bare mesh", ErrorCode::unsupported_pair);
+    }
+  }
+
+  Status read_features() {
+    const SceneJson* features = reader_.raw("features");
+    const char* accepted = "a feature, or an array of them";
+    if (features == nullptr) return success();
+    if (features->is_object()) {
+      SceneJson canonical;
+      ASPERITY_CHECK(read_feature(*features, reader_.place_of("features"), canonical));
+      reader_.write("features", SceneJson::array({std::move(canonical)}));
+      return success();
+    }
+    if (!features->is_array()) {
+      reader_.fail_type("features", *features, accepted);
+    } else if (features->empty() || features->size() > FineFeatures::most_features) {
+      reader_.fail("features", fmt::format("has {} features", features->size()),
+                   fmt::format("1 to {} of them", FineFeatures::most_features));
+    }
+    ASPERITY_CHECK(reader_.status());
+    SceneJson canonical = SceneJson::array();
+    for (std::size_t i = 0; i < features->size(); ++i) {
+      SceneJson one;
+      ASPERITY_CHECK(read_feature((*features)[i], fmt::format("{}[{}]", reader_.place_of("features"), i), one));
+      canonical.push_back(std::move(one));
+    }
+    reader_.write("features", std::move(canonical));
+    return success();
+  }
+
+  /// Length along u after which the mapping comes back, 0 where it does not.
+  [[nodiscard]] double around() const {
+    const ParametricSurface* surface = host_.parametric;
+    const FeatureMappingSettings& mapping = part_.fine.mapping.settings();
+    if (mapping.surface != IntermediateSurface::uv) return part_.fine.mapping.circumference();
+    if (surface == nullptr || !surface->closed_u()) return 0.0;
+    return mapping.tile.x() * (surface->upper().x() - surface->lower().x());
+  }
+
+  /// A closed surface's parameters come back as a cylinder's angle does.
+  [[nodiscard]] Status check_closed(const SurfaceFeature& feature) const {
+    const auto closes = [](const SurfaceFeature& laid, double length) -> Status {
+      FeatureMappingSettings round;
+      round.surface = IntermediateSurface::cylinder;
+      round.radius = length / (2.0 * pi);
+      ASPERITY_TRY(const FeatureMapping cylinder, FeatureMapping::build(round));
+      return cylinder.check(laid);
+    };
+    const ParametricSurface* surface = host_.parametric;
+    const FeatureMappingSettings& mapping = part_.fine.mapping.settings();
+    if (surface == nullptr || mapping.surface != IntermediateSurface::uv) return success();
+    const Vec2 lengths = mapping.tile.cwiseProduct(surface->upper() - surface->lower());
+    if (surface->closed_u()) ASPERITY_CHECK(closes(feature, lengths.x()));
+    if (!surface->closed_v()) return success();
+    FeatureSpec turned = feature.spec();
+    turned.direction -= 0.5 * pi;
+    std::swap(turned.period.x(), turned.period.y());
+    ASPERITY_TRY(const SurfaceFeature laid, SurfaceFeature::build(turned));
+    return closes(laid, lengths.y());
+  }
+
+  Status read_feature(const SceneJson& json, const std::string& place, SceneJson& canonical) {
+    FeatureReader one(json, place, around(), context_);
+    ASPERITY_TRY(SurfaceFeature feature, one.read());
+    const std::size_t as = one.reader().choice("as", scale_names(), as_);
+    ASPERITY_CHECK(one.reader().status());
+    if (auto fits = part_.fine.mapping.check(feature); !fits) return one.placed(std::move(fits).error());
+    if (auto fits = check_closed(feature); !fits) return one.placed(std::move(fits).error());
+    canonical = std::move(one.reader().canonical());
+    const FeatureScale own = scale_of(feature.wavelength(), scales_);
+    const FeatureScale scale = as == 0 ? own : static_cast<FeatureScale>(as - 1);
+    note_scale(feature, own, scale);
+    if (scale == FeatureScale::shape) ASPERITY_CHECK(check_geometry(feature, place));
+    (scale == FeatureScale::friction  ? part_.fine.micro
+     : scale == FeatureScale::texture ? part_.fine.texture
+                                      : part_.geometry)
+        .push_back(std::move(feature));
+    return success();
+  }
+
+  void note_scale(const SurfaceFeature& feature, FeatureScale own, FeatureScale scale) {
+    std::string why;
+    switch (own) {
+      case FeatureScale::friction:
+        why = fmt::format("finer than {} is friction", format_length(scales_.friction_below));
+        break;
+      case FeatureScale::texture:
+        why = fmt::format("{} to {} is texture", format_length(scales_.friction_below),
+                          format_length(scales_.shape_from));
+        break;
+      case FeatureScale::shape: why = fmt::format("{} and more is shape", format_length(scales_.shape_from)); break;
+    }
+    context_.note(fmt::format("surface \"{}\": {} of {} is felt as {}{} ({})", host_.name,
+                              feature_name(feature.spec().kind), format_length(feature.wavelength()), scale_name(scale),
+                              own == scale ? "" : ", as the scene asks", why));
+  }
+
+  [[nodiscard]] Status check_geometry(const SurfaceFeature& feature, const std::string& place) const {
+    const IntermediateSurface mapping = part_.fine.mapping.settings().surface;
+    const auto refused = [&](std::string why, std::string accepted) {
+      return Error{ErrorCode::unsupported_pair,
+                   fmt::format("{} of {} would be geometry, {}", feature_name(feature.spec().kind),
+                               format_length(feature.wavelength()), why),
+                   {},
+                   place,
+                   fmt::format("\"as\": \"texture\", {}", accepted)};
+    };
+    if (!host_.rigid.empty())
+      return refused(fmt::format("and this is {}", host_.rigid), "or a mesh without a coat, or a parametric surface");
+    if (host_.parametric != nullptr && mapping != IntermediateSurface::uv)
+      return refused("which lies in the parameters of this surface", "or the mapping \"uv\"");
+    if (host_.parametric != nullptr) return success();
+    if (mapping == IntermediateSurface::box)
+      return refused("and a box's six planes make no one map", "or another mapping");
+    if (std::holds_alternative<GodObjectLaw>(law_))
+      return refused(fmt::format("which the law \"{}\" does not feel", law_name(law_)), "or the law \"proxy\"");
+    return success();
+  }
+
+  ObjectReader reader_;
+  bool coated_ = false;
+  const TextureHost& host_;
+  const Law& law_;
+  SceneContext& context_;
+  FeatureScales scales_;
+  std::size_t as_ = 0;
+  TexturePart part_;
+};
+
+}  // namespace
+
+const char* mapping_name(IntermediateSurface surface) {
+  return mapping_names()[static_cast<std::size_t>(surface)].c_str();
+}
+
+Result<TexturePart> read_texture(ObjectReader& surface, const TextureHost& host, const Law& law,
+                                 SceneContext& context) {
+  if (!surface.has("texture")) {
+    TexturePart part;
+    ASPERITY_TRY(ScenePart<FeatureMapping> mapping,
+                 MappingReader(nullptr, surface.place_of("texture.mapping"), host).read());
+    part.fine.mapping = std::move(mapping.value);
+    return part;
+  }
+  TextureReader reader(surface, host, law, context);
+  ASPERITY_TRY(TexturePart part, reader.read());
+  surface.take("texture", std::move(reader.reader()));
+  ASPERITY_CHECK(surface.status());
+  return part;
+}
+
+Status attach_fine(const ObjectReader& surface, TexturePart texture, const FinePart& material,
+                   const SceneContext& context, Instance& instance) {
+  FineSettings& fine = texture.fine;
+  const bool shapes_friction = material.lay_given || material.friction_map.factors != nullptr;
+  const bool felt = fine.source == TextureSource::coat || !fine.texture.empty() || !fine.micro.empty();
+  if (texture.given && !felt && !shapes_friction && texture.geometry.empty()) {
+    return Error{ErrorCode::bad_value,
+                 "has no features",
+                 {},
+                 surface.place_of("texture.features"),
+                 "a feature or an array of them (without them, a lay or a friction map of the material)"};
+  }
+  if (!felt && !shapes_friction) return success();
+  const bool replaced = base_of(instance.surface) != nullptr && !texture.geometry.empty() &&
+                        fine.mapping.settings().surface == IntermediateSurface::uv;
+  if (replaced) {
+    return Error{ErrorCode::unsupported_pair,
+                 "is \"uv\", and features that become geometry take the mesh's texture coordinates",
+                 {},
+                 surface.place_of("texture.mapping.surface"),
+                 "\"plane\", \"cylinder\" or \"sphere\", or features of one kind"};
+  }
+  fine.lay = material.lay;
+  fine.friction_map = material.friction_map;
+  fine.resolution = context.device.position_resolution;
+  Result<FineFeatures> built = FineFeatures::build(std::move(fine));
+  if (!built) return std::move(built).error().at(surface.place_of("texture"));
+  instance.fine = std::make_shared<const FineFeatures>(std::move(*built));
+  return success();
+}
+
+void note_rendering(const Instance& instance, const StrokePath& path, double speed, double rate,
+                    SceneContext& context) {
+  if (instance.fine == nullptr || instance.fine->settings().texture.empty()) return;
+  const FineSettings& fine = instance.fine->settings();
+  for (const SurfaceFeature& feature : fine.texture) {
+    const WaveRange waves = waves_along(instance, feature, path);
+    if (!waves.changes) {
+      context.note(fmt::format(
+          "surface \"{}\": {} of {} does not change along the surface under the stroke, as the mapping \"{}\" lays it "
+          "there: no texture is felt of it (another axis, direction or mapping lays it along the surface)",
+          instance.name, feature_name(feature.spec().kind), format_length(feature.wavelength()),
+          mapping_name(fine.mapping.settings().surface)));
+      continue;
+    }
+    const double share = texture_share(waves.shortest, speed, Seconds(1.0 / rate), fine.resolution);
+    const std::string size = waves.longest < 1.01 * waves.shortest
+                                 ? format_length(waves.shortest)
+                                 : fmt::format("{} to {}", format_length(waves.shortest), format_length(waves.longest));
+    const std::string levels =
+        fine.resolution > 0.0
+            ? fmt::format("{:.4g} levels of {}", waves.shortest / fine.resolution, format_length(fine.resolution))
+            : std::string("as many levels as wanted");
+    context.note(fmt::format("surface \"{}\": {} of {} under the stroke: {} and {:.4g} samples of the shortest wave{}",
+                             instance.name, feature_name(feature.spec().kind), size, levels,
+                             waves.shortest * rate / speed,
+                             share < 1.0 ? fmt::format(", where it is faded to {:.0f} %", 100.0 * share) : ""));
+  }
+}
+
+}  // namespace asperity

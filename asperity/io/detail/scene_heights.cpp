@@ -1,0 +1,410 @@
+// Heights in a scene file: coats, features that are maps, and maps of friction read them alike.
+
+#include "asperity/io/detail/scene_heights.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "asperity/io/image_io.h"
+
+namespace asperity {
+namespace {
+
+const std::vector<std::string>& channel_names() {
+  static const std::vector<std::string> names{"automatic", "luminance", "red", "green", "blue", "alpha"};
+  return names;
+}
+
+/// Reads a formula's parameters; every one that the formula does not take is refused by name. What they must be to one
+/// another (a flank within its rim) the formula itself checks.
+class HeightGeneratorReader {
+ public:
+  explicit HeightGeneratorReader(ObjectReader& reader) : reader_(reader) {}
+
+  MesostructureSpec read() {
+    spec_.kind = read_kind();
+    spec_.size = reader_.integer("size", 512, 2, 8192);
+    refuse_others();
+    spec_ = completed(spec_);
+    if (takes("count")) spec_.count = reader_.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
+    if (takes("number")) read_number();
+    if (takes("seed")) read_seed();
+    if (takes("wall")) spec_.wall = share("wall", spec_.wall, 0.5);
+    if (takes("width")) spec_.width = share("width", *spec_.width, 1.0);
+    if (takes("flank")) spec_.flank = share("flank", own_flank(), 0.25);
+    if (takes("radius")) read_radius();
+    if (takes("rim")) spec_.rim = share("rim", spec_.rim, 0.5);
+    if (takes("field")) spec_.field = share("field", spec_.field, 1.0);
+    if (takes("overlap")) spec_.overlap = share("overlap", spec_.overlap, 0.9);
+    if (takes("hurst")) spec_.hurst = reader_.number("hurst", spec_.hurst, Range{0.05, 1.0});
+    if (takes("octaves")) spec_.octaves = reader_.integer("octaves", *spec_.octaves, 1, 12);
+    return spec_;
+  }
+
+ private:
+  MesostructureKind read_kind() {
+    const std::string name = reader_.text("generator", "");
+    if (reader_.failed()) return MesostructureKind::flat;
+    Result<MesostructureKind> parsed = parse_mesostructure_kind(name);
+    if (parsed) return *parsed;
+    reader_.fail(std::move(parsed).error().at(reader_.place_of("generator")));
+    return MesostructureKind::flat;
+  }
+
+  [[nodiscard]] bool takes(std::string_view parameter) const {
+    const auto taken = parameters_of(spec_.kind);
+    return std::find(taken.begin(), taken.end(), parameter) != taken.end();
+  }
+
+  void refuse_others() {
+    for (const SceneObjectKeys& entry : scene_object_keys()) {
+      if (entry.object != "height generator") continue;
+      for (const std::string& key : entry.keys) {
+        if (key != "generator" && key != "size" && !takes(key)) reader_.refuse({key}, "by this generator");
+      }
+    }
+  }
+
+  double share(std::string_view key, double fallback, double most) {
+    return reader_.quantity(key, Dimension::ratio, fallback, Range{0.0, most});
+  }
+
+  /// The groove's follows from its width, which may be stated.
+  [[nodiscard]] double own_flank() const {
+    MesostructureSpec open = spec_;
+    open.flank.reset();
+    return *completed(open).flank;
+  }
+
+  void read_number() {
+    if (spec_.number || reader_.has("number"))
+      spec_.number = reader_.integer("number", spec_.number.value_or(1), 1, 2000);
+  }
+
+  void read_seed() {
+    if (spec_.kind == MesostructureKind::rings && !spec_.number) {
+      reader_.refuse({"seed"}, "by the fixed arrangement (\"number\" scatters features)");
+    } else {
+      spec_.seed = reader_.seed("seed", spec_.seed);
+    }
+  }
+
+  void read_radius() {
+    const SceneJson* given = reader_.raw("radius");
+    const bool one = spec_.kind == MesostructureKind::groove;
+    if (given != nullptr && given->is_array() && !one) {
+      read_radius_range(*given);
+    } else if (given != nullptr || one) {
+      const double radius = reader_.quantity("radius", Dimension::ratio, spec_.radius->high, Range{0.001, 0.25});
+      spec_.radius = ShareRange{radius, radius};
+    } else {
+      reader_.write("radius", SceneJson::array({spec_.radius->low, spec_.radius->high}));
+    }
+  }
+
+  void read_radius_range(const SceneJson& given) {
+    const char* accepted = "a share of the tile from 0.001 to 0.25, or two [smallest, largest]";
+    if (given.size() != 2 || !given[0].is_number() || !given[1].is_number()) {
+      reader_.fail("radius", "is no pair of numbers", accepted);
+      return;
+    }
+    spec_.radius = ShareRange{given[0].get<double>(), given[1].get<double>()};
+    reader_.write("radius", given);
+  }
+
+  ObjectReader& reader_;
+  MesostructureSpec spec_;
+};
+
+}  // namespace
+
+Status HeightSourceReader::read_source() {
+  const SceneJson* map = reader_.raw(key_);
+  if (map == nullptr) {
+    reader_.fail(key_, "is missing",
+                 "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
+  } else if (map->is_object()) {
+    generated_ = true;
+    if (map->contains("library")) {
+      ASPERITY_CHECK(read_library(*map));
+    } else {
+      read_generator(*map);
+    }
+    reader_.refuse({"channel", "white_is", "height_range"}, "for a generated height map");
+  } else if (map->is_string()) {
+    return read_image_source(map->get_ref<const std::string&>());
+  } else {
+    reader_.fail_type(key_, *map,
+                      "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
+  }
+  return reader_.status();
+}
+
+void HeightSourceReader::read_generator(const SceneJson& json) {
+  ObjectReader generator(json, reader_.place_of(key_), "height generator");
+  spec_ = HeightGeneratorReader(generator).read();
+  reader_.take(key_, std::move(generator));
+}
+
+Status HeightSourceReader::read_library(const SceneJson& json) {
+  ObjectReader reader(json, reader_.place_of(key_), "library relief");
+  const std::string name = reader.text("library", "");
+  const int size = reader.integer("size", 512, 16, 4096);
+  const std::uint64_t seed = reader.seed("seed", 0);
+  ASPERITY_CHECK(reader.status());
+  Result<LibraryRelief> relief = library_mesostructure(name, size, seed);
+  if (!relief) return std::move(relief).error().at(reader.place_of("library"));
+  library_ = std::move(*relief);
+  HeightSidecar known;
+  known.file = "the library";
+  known.width = known.height = size;
+  known.high = library_.amplitude;
+  known.pixel = library_.tile / size;
+  sidecar_ = known;
+  reader_.take(key_, std::move(reader));
+  return success();
+}
+
+/// Floats as the file stores them: metres, unless the scene says what their range stands for.
+Status HeightSourceReader::read_floats() {
+  const std::string channel = reader_.text("channel", "automatic");
+  ASPERITY_CHECK(reader_.status());
+  Result<FloatImage> image = read_float_image(path_, channel);
+  if (!image) {
+    Error error = std::move(image).error().in_file(path_.string());
+    if (error.place.empty()) error.place = reader_.place_of("channel");
+    return error;
+  }
+  floats_ = std::move(*image);
+  reader_.write(key_, path_.string());
+  return success();
+}
+
+Status HeightSourceReader::read_image_source(const std::string& file) {
+  path_ = context_.resolve(file);
+  if (context_.progress) context_.progress("reading height map", 0.0);
+  std::string extension = path_.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".exr") return read_floats();
+  Result<Image> image = read_image(path_);
+  if (!image) {
+    Error error = std::move(image).error().in_file(path_.string());
+    if (error.place.empty()) error.place = reader_.place_of(key_);
+    return error;
+  }
+  image_ = std::move(*image);
+  reader_.write(key_, path_.string());
+  channel_ = static_cast<Channel>(reader_.choice("channel", channel_names(), 0));
+  return read_sidecar();
+}
+
+Status HeightSourceReader::read_sidecar() {
+  std::filesystem::path path = path_;
+  path.replace_extension(".json");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return success();
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  Result<SceneJson> json = parse_scene_json(text, path.string());
+  // A file of that name need not be about heights at all.
+  if (!json || !json->is_object() || !json->contains("height_min_m") || !json->contains("height_max_m"))
+    return success();
+  const auto number = [&](const SceneJson& value) { return value.is_number() ? value.get<double>() : std::nan(""); };
+  const auto member = [&](const char* key) { return json->contains(key) ? number((*json)[key]) : std::nan(""); };
+  HeightSidecar sidecar;
+  sidecar.file = path.filename().string();
+  sidecar.width = image_.width;
+  sidecar.height = image_.height;
+  sidecar.low = member("height_min_m");
+  sidecar.high = member("height_max_m");
+  const bool sizes = member("width") == image_.width && member("height") == image_.height;
+  const SceneJson pixel = json->contains("pixel_size_m") ? (*json)["pixel_size_m"] : SceneJson();
+  if (pixel.is_array() && pixel.size() == 2) sidecar.pixel = Vec2(number(pixel[0]), number(pixel[1]));
+  if (!sizes || !(sidecar.high >= sidecar.low) || !(sidecar.pixel.minCoeff() > 0.0) || !sidecar.pixel.allFinite()) {
+    return Error{
+        ErrorCode::mismatch,
+        fmt::format("does not describe the image beside it, which has {} x {} pixels", image_.width, image_.height),
+        path.string(),
+        {},
+        "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image"};
+  }
+  sidecar_ = sidecar;
+  return success();
+}
+
+/// What a height may be, for messages.
+std::string HeightSourceReader::accepted_height(const Range& range) const {
+  const bool signed_height = range.low < 0.0;
+  return fmt::format("a length{} ({}){}", signed_height ? "" : " of 0 or more", accepted_units(Dimension::length),
+                     mean_edge_ > 0.0 ? ", or a share of the mean edge (\"10 %\")" : "");
+}
+
+/// A length, or a share of the mean edge (the papers' shorthand), in metres.
+Result<double> HeightSourceReader::height_of(const SceneJson& value, const std::string& place,
+                                             const Range& range) const {
+  const auto wrong = [&](ErrorCode code, std::string what) {
+    return Error{code, std::move(what), {}, place, accepted_height(range)};
+  };
+  double height = 0.0;
+  if (value.is_string()) {
+    const auto& text = value.get_ref<const std::string&>();
+    const bool share = mean_edge_ > 0.0 && text.find('%') != std::string::npos;
+    Result<double> parsed = parse_quantity(text, share ? Dimension::ratio : Dimension::length);
+    if (!parsed && share) return wrong(ErrorCode::bad_value, fmt::format("\"{}\" is no share of the mean edge", text));
+    if (!parsed) return wrong(ErrorCode::bad_value, parsed.error().what);
+    height = share ? *parsed * mean_edge_ : *parsed;
+  } else if (value.is_number()) {
+    height = value.get<double>();
+  } else {
+    return wrong(ErrorCode::bad_type, fmt::format("is {}", json_type(value)));
+  }
+  if (std::isfinite(height) && range.holds(height)) return height;
+  return wrong(ErrorCode::bad_value, value.is_string() ? fmt::format("is {}", value.get_ref<const std::string&>())
+                                                       : fmt::format("is {:.6g}", height));
+}
+
+double HeightSourceReader::read_height(const char* key, double fallback, const Range& range) {
+  const SceneJson* value = reader_.raw(key);
+  double height = fallback;
+  if (value != nullptr) {
+    Result<double> read = height_of(*value, reader_.place_of(key), range);
+    if (!read) {
+      reader_.fail(std::move(read).error());
+      return fallback;
+    }
+    height = *read;
+  }
+  reader_.write(key, height);
+  return height;
+}
+
+Status HeightSourceReader::read_scale(double magnify) {
+  static const std::vector<std::string> white{"high", "deep"};
+  magnify_ = magnify;
+  if (!generated_) white_is_deep_ = reader_.choice("white_is", white, 0) == 1;
+  if (const SceneJson* range = reader_.raw("height_range")) {
+    reader_.refuse({"height", "offset"}, "beside height_range");
+    read_range(*range);
+    return reader_.status();
+  }
+  const bool flat = generated_ && library_.heights.empty() && spec_.kind == MesostructureKind::flat;
+  if (!floats_.values.empty() && !reader_.has("height")) {
+    // Values in metres, moved by an offset.
+    scale_ = {1.0, read_height("offset", 0.0, Range{})};
+    context_.note(fmt::format(
+        "{}: heights {} to {}, in metres as the EXR file stores them (\"height\" or "
+        "\"height_range\" says what its range stands for otherwise)",
+        who_, format_length(static_cast<double>(floats_.lowest)), format_length(static_cast<double>(floats_.highest))));
+    stored_metres_ = true;
+    return reader_.status();
+  }
+  if (sidecar_ && !reader_.has("height") && !reader_.has("offset")) {
+    scale_ = {sidecar_->high - sidecar_->low, white_is_deep_ ? sidecar_->high : sidecar_->low};
+    reader_.write("height", scale_.amplitude);
+    reader_.write("offset", scale_.offset);
+    context_.note(fmt::format("{}: heights {} to {} from {}", who_, format_length(sidecar_->low),
+                              format_length(sidecar_->high), sidecar_->file));
+    return reader_.status();
+  }
+  if (mean_edge_ <= 0.0 && !flat && !reader_.has("height")) {
+    reader_.fail("height", "is missing", accepted_height(Range::not_negative()));
+    return reader_.status();
+  }
+  constexpr double papers_best = 0.1;  // hrm-2010, 5.3: the share of the edge that is perceived best
+  // `magnify` scales what the scene says; the default is a share of the mesh as it is.
+  const double fallback = flat ? 0.0 : papers_best * mean_edge_ / magnify_;
+  scale_.amplitude = read_height("height", fallback, flat ? Range{} : Range::not_negative());
+  scale_.offset = read_height("offset", 0.0, Range{});
+  if (!reader_.has("height") && !flat) {
+    context_.note(
+        fmt::format("{}: no height is stated; 10 % of the mean edge is taken, {} (\"height\" chooses otherwise)", who_,
+                    format_length(magnify_ * fallback)));
+  }
+  return reader_.status();
+}
+
+void HeightSourceReader::read_range(const SceneJson& range) {
+  if (!range.is_array() || range.size() != 2) {
+    reader_.fail_type("height_range", range, "two lengths [lowest, highest]");
+    return;
+  }
+  double ends[2] = {0.0, 0.0};
+  for (std::size_t i = 0; i < 2; ++i) {
+    Result<double> end = height_of(range[i], fmt::format("{}[{}]", reader_.place_of("height_range"), i), Range{});
+    if (!end) {
+      reader_.fail(std::move(end).error());
+      return;
+    }
+    ends[i] = *end;
+  }
+  if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", "two lengths [lowest, highest]");
+  scale_ = {ends[1] - ends[0], white_is_deep_ ? ends[1] : ends[0]};
+  reader_.write("height_range", SceneJson::array({ends[0], ends[1]}));
+}
+
+Result<HeightMap> HeightSourceReader::build(Wrap wrap, Reconstruction reconstruction) const {
+  const double amplitude = magnify_ * scale_.amplitude;
+  const double offset = magnify_ * scale_.offset;
+  if (generated_) return generated_heights(amplitude, offset, wrap, reconstruction);
+  return image_heights({amplitude, offset, white_is_deep_, wrap, reconstruction});
+}
+
+Result<HeightMap> HeightSourceReader::build_between(double black, double white, Wrap wrap,
+                                                    Reconstruction reconstruction) const {
+  if (generated_) return generated_heights(white - black, black, wrap, reconstruction);
+  return image_heights({std::abs(white - black), black, white < black, wrap, reconstruction});
+}
+
+Result<HeightMap> HeightSourceReader::image_heights(const HeightMapSettings& settings) const {
+  if (!floats_.values.empty()) {
+    Result<HeightMap> heights = float_heights(floats_, settings, !stored_metres_);
+    if (!heights) return std::move(heights).error().in_file(path_.string()).at(reader_.place_of(key_));
+    context_.note(fmt::format("{}: heights are read from the channel {} ({})", who_, floats_.channel, floats_.reason));
+    return heights;
+  }
+  Result<HeightMap> heights = HeightMap::build(image_, channel_, settings);
+  if (!heights) {
+    Error error = std::move(heights).error().in_file(path_.string());
+    error.place =
+        reader_.place_of(!error.place.empty() ? error.place : (channel_ == Channel::automatic ? key_ : "channel"));
+    if (error.code == ErrorCode::bad_value) error.code = ErrorCode::bad_map;
+    return error;
+  }
+  if (channel_ == Channel::automatic && !heights->channel().reason.empty()) {
+    context_.note(fmt::format("{}: heights are read from the {} channel ({})", who_,
+                              to_string(heights->channel().channel), heights->channel().reason));
+  }
+  return heights;
+}
+
+Result<HeightMap> HeightSourceReader::generated_heights(double amplitude, double offset, Wrap wrap,
+                                                        Reconstruction reconstruction) const {
+  MesostructureSpec spec = spec_;
+  // A formula's amplitude is not negative but where it is the height itself.
+  if (!library_.heights.empty()) {
+    const double scale = library_.amplitude > 0.0 ? amplitude / library_.amplitude : 0.0;
+    std::vector<float> heights = library_.heights;
+    for (float& height : heights) height = static_cast<float>(scale * static_cast<double>(height) + offset);
+    Result<HeightMap> map = HeightMap::build(std::move(heights), library_.size, library_.size, wrap, reconstruction);
+    if (!map) return std::move(map).error().at(reader_.place());
+    return map;
+  }
+  const bool flipped = amplitude < 0.0 && spec.kind != MesostructureKind::flat;
+  spec.amplitude = flipped ? -amplitude : amplitude;
+  Result<std::vector<float>> heights = generate_heights(spec);
+  if (!heights) return std::move(heights).error().at(reader_.place_of(key_));
+  if (flipped || offset != 0.0) {
+    const double sign = flipped ? -1.0 : 1.0;
+    for (float& height : *heights) height = static_cast<float>(sign * static_cast<double>(height) + offset);
+  }
+  Result<HeightMap> map = HeightMap::build(std::move(*heights), spec.size, spec.size, wrap, reconstruction);
+  if (!map) return std::move(map).error().at(reader_.place());
+  return map;
+}
+
+}  // namespace asperity

@@ -1,0 +1,341 @@
+#include "asperity/study/detail/ray_cast.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include "asperity/render/fine_contact.h"
+
+namespace asperity {
+namespace {
+
+// A hit beyond an open rim is passed; after so many the ray counts as lost.
+constexpr int most_rim_hits = 4;
+// Corners of a smooth cell bend by less than about 14 degrees; between pixels, a bend of more than about 11 is an edge.
+constexpr double smooth_cosine = 0.97;
+constexpr double least_bend = 0.018;
+
+/// The part of a ray, by parameter, that lies within a box; empty when `from > to`.
+struct Interval {
+  double from = 0.0;
+  double to = infinity;
+};
+
+Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
+  Interval inside;
+  for (int k = 0; k < 3; ++k) {
+    double near = (box.lower[k] - origin[k]) / direction[k];
+    double far = (box.upper[k] - origin[k]) / direction[k];
+    if (direction[k] == 0.0) {
+      const bool within = origin[k] >= box.lower[k] && origin[k] <= box.upper[k];
+      near = within ? -infinity : infinity;
+      far = infinity;
+    }
+    if (near > far) std::swap(near, far);
+    inside.from = std::max(inside.from, near);
+    inside.to = std::min(inside.to, far);
+  }
+  return inside;
+}
+
+/// First touch of a mesh, an isosurface, a parametric or a custom surface by the ray's parameter, from the sides that
+/// can be touched.
+template <class S>
+Pixel first_touch(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
+  const Segment motion{origin + part.from * direction, origin + part.to * direction};
+  const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
+  if (!hit.hit) return {};
+  return {part.from + hit.t * (part.to - part.from), hit.contact.normal, hit.contact.element};
+}
+
+Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+Pixel first_hit(const ParametricSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+Pixel first_hit(const CustomSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  return first_touch(surface, origin, direction, part, sides, hint);
+}
+
+/// The mesh that an implicit surface was made from is there to be seen; where what is felt differs, that is shown.
+Pixel first_hit(const ImplicitSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  if (surface.is_mesh())
+    return first_hit(*surface.mesh(), origin, direction, part, surface.mesh()->natural_sides(), hint);
+  return first_hit(surface.iso(), origin, direction, part, sides, hint);
+}
+
+/// Whether a point over an open mesh lies beside its rim: the implicit relief goes on there, what is felt does not.
+bool beside_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
+  const Foot foot = surface.base().closest(point, infinity, hint);
+  if (!foot.found()) return true;
+  return asperity::beyond_rim(surface.base().mesh(), foot, point, surface.skin());
+}
+
+/// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is
+/// wide.
+Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                Hint& hint) {
+  const bool open = !surface.base().mesh().report().closed();
+  const double after = surface.skin() / direction.norm();
+  for (int i = 0; i < most_rim_hits && part.from < part.to; ++i) {
+    const Segment motion{origin + part.from * direction, origin + part.to * direction};
+    const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
+    if (!hit.hit) return {};
+    const double t = part.from + hit.t * (part.to - part.from);
+    if (!open || !beside_rim(surface, origin + t * direction, hint))
+      return {t, hit.contact.normal, hit.contact.element};
+    part.from = t + 10.0 * after;
+  }
+  return {};
+}
+
+/// Calls work(row) for every row, shared out over threads; the calling thread takes part.
+template <class Work>
+void for_each_row(int rows, int threads, const Work& work) {
+  std::atomic<int> next{0};
+  const auto run = [&](bool first) {
+    auto worker = work();
+    for (int row = next++; row < rows; row = next++) worker(row, first);
+  };
+  std::vector<std::thread> others;
+  try {
+    for (int i = 1; i < threads; ++i) others.emplace_back(run, false);
+  } catch (const std::system_error&) {
+    // Fewer threads do the same work.
+  }
+  run(true);
+  for (std::thread& other : others) other.join();
+}
+
+/// Pixel positions 0, block, 2 block ..., and the last one.
+std::vector<int> places(int size, int block) {
+  std::vector<int> out;
+  for (int i = 0; i < size - 1; i += block) out.push_back(i);
+  out.push_back(size - 1);
+  return out;
+}
+
+/// Pixels x0 ... x1 by y0 ... y1, with what the rays at its corners saw: upper left, upper right, lower left, lower
+/// right.
+struct Cell {
+  int x0, x1, y0, y1;
+  const Pixel* corners[4];
+};
+
+/// Whether all corners see nothing, or one patch without a bend.
+bool smooth(const Cell& cell, const Camera& camera) {
+  const Pixel& first = *cell.corners[0];
+  for (const Pixel* corner : cell.corners) {
+    if (corner->hit() != first.hit()) return false;
+    if (first.hit() && corner->normal.dot(first.normal) < smooth_cosine) return false;
+  }
+  if (!first.hit()) return true;
+  const double twist =
+      cell.corners[0]->depth + cell.corners[3]->depth - cell.corners[1]->depth - cell.corners[2]->depth;
+  for (const Pixel* corner : cell.corners) {
+    if (corner->filled != first.filled) return false;
+  }
+  return std::abs(twist) < camera.pixel * first.depth;
+}
+
+/// Rays a block apart: places along both sides of the image, and what was seen at each.
+struct Lattice {
+  std::vector<int> xs;
+  std::vector<int> ys;
+  PixelGrid knots;
+  [[nodiscard]] Cell cell(int column, int row) const {
+    const auto c = static_cast<std::size_t>(column);
+    const auto r = static_cast<std::size_t>(row);
+    return {xs[c],
+            xs[c + 1],
+            ys[r],
+            ys[r + 1],
+            {&knots.at(column, row), &knots.at(column + 1, row), &knots.at(column, row + 1),
+             &knots.at(column + 1, row + 1)}};
+  }
+};
+
+template <class Done>
+Lattice cast_lattice(const Scene& scene, const Camera& camera, int block, int threads, const Done& done) {
+  Lattice lattice{places(static_cast<int>(camera.width), block), places(static_cast<int>(camera.height), block), {}};
+  PixelGrid& knots = lattice.knots;
+  knots.columns = static_cast<int>(lattice.xs.size());
+  knots.rows = static_cast<int>(lattice.ys.size());
+  knots.pixels.resize(lattice.xs.size() * lattice.ys.size());
+  for_each_row(knots.rows, threads, [&] {
+    return [&, caster = RayCaster(scene, camera)](int row, bool first) mutable {
+      const double y = lattice.ys[static_cast<std::size_t>(row)] + 0.5;
+      for (int column = 0; column < knots.columns; ++column) {
+        knots.pixels[knots.index(column, row)] = caster.cast(lattice.xs[static_cast<std::size_t>(column)] + 0.5, y);
+      }
+      if (first) done(static_cast<double>(row + 1) / knots.rows);
+    };
+  });
+  return lattice;
+}
+
+void fill_cell(const Cell& cell, const Camera& camera, RayCaster& caster, PixelGrid& grid) {
+  const bool interpolate = smooth(cell, camera);
+  const int right = cell.x1 == grid.columns - 1 ? cell.x1 + 1 : cell.x1;
+  const int bottom = cell.y1 == grid.rows - 1 ? cell.y1 + 1 : cell.y1;
+  for (int y = cell.y0; y < bottom; ++y) {
+    for (int x = cell.x0; x < right; ++x) {
+      Pixel& out = grid.pixels[grid.index(x, y)];
+      if (!interpolate) {
+        out = caster.cast(x + 0.5, y + 0.5);
+      } else if (cell.corners[0]->hit()) {
+        const double u = static_cast<double>(x - cell.x0) / (cell.x1 - cell.x0);
+        const double v = static_cast<double>(y - cell.y0) / (cell.y1 - cell.y0);
+        const double weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+        out = {0.0, Vec3::Zero()};
+        out.filled = cell.corners[0]->filled;
+        for (int k = 0; k < 4; ++k) {
+          out.depth += weights[k] * cell.corners[k]->depth;
+          out.normal += weights[k] * cell.corners[k]->normal;
+        }
+        out.normal.normalize();
+      }
+    }
+  }
+}
+
+/// How much a pixel differs from its neighbours: 3 at an outline, 2 at a jump of depth, else 1 - cosine of the bend.
+double edge_strength(const PixelGrid& grid, const Camera& camera, int x, int y) {
+  const Pixel& here = grid.at(x, y);
+  double strength = 0.0;
+  constexpr int neighbours[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+  for (const auto& step : neighbours) {
+    const int nx = x + step[0];
+    const int ny = y + step[1];
+    if (nx < 0 || ny < 0 || nx >= grid.columns || ny >= grid.rows) continue;
+    const Pixel& other = grid.at(nx, ny);
+    if (here.hit() != other.hit()) return 3.0;
+    if (!here.hit()) continue;
+    // On a patch that is not seen from its edge, neighbours are not farther apart in depth than this.
+    const bool jump = std::abs(here.depth - other.depth) > 8.0 * camera.pixel * here.depth;
+    strength = std::max(strength, jump ? 2.0 : 1.0 - here.normal.dot(other.normal));
+  }
+  return strength;
+}
+
+}  // namespace
+
+Pixel RayCaster::cast(double x, double y) {
+  const Vec3 direction = camera_->ray(x, y);
+  Pixel nearest;
+  for (std::size_t i = 0; i < scene_->instances().size(); ++i) {
+    const Instance& instance = scene_->instances()[i];
+    const Vec3 from = instance.world_from_object.apply_inverse(camera_->eye);
+    const Vec3 along = instance.world_from_object.rotate_inverse(direction);
+    const IsoSurface* iso = iso_of(instance.surface);
+    const Box bounds = iso != nullptr ? iso->surface_bounds() : surface_bounds(instance.surface);
+    Interval part = clip(from, along, bounds.grown(1e-3 * bounds.diagonal()));
+    part.to = std::min(part.to, nearest.depth);
+    if (part.from >= part.to) continue;
+    const Pixel seen = std::visit(
+        [&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, hints_[i]); }, instance.surface);
+    if (!seen.hit() || seen.depth >= nearest.depth) continue;
+    nearest = seen;
+    Vec3 normal = seen.normal.dot(along) > 0.0 ? Vec3(-seen.normal) : seen.normal;
+    if (instance.fine != nullptr) {
+      // What is felt as a texture is seen as one.
+      const double footprint = camera_->pixel * seen.depth;
+      normal -= texture_at(instance, seen.element, from + seen.depth * along, normal, hints_[i], footprint).gradient;
+      normal.normalize();
+    }
+    nearest.normal = instance.world_from_object.rotate(normal);
+    nearest.filled = 0.0;
+    if (instance.closed_from != nullptr) {
+      const ClosedRelief& closed = instance.closed_from->closed;
+      const ReliefPlace& place = hints_[i].relief;
+      const Vec3 barycentric(1.0 - place.u - place.v, place.u, place.v);
+      nearest.filled = closed.rise_at(place.frame.face, barycentric) > closed.report.tolerance ? 1.0 : 0.0;
+    }
+  }
+  return nearest;
+}
+
+PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, int threads, const Progress& progress) {
+  const double share = block == 1 ? 1.0 : 0.4;
+  const Lattice lattice = cast_lattice(scene, camera, block, threads, [&](double done) {
+    if (progress) progress("drawing the picture", share * done);
+  });
+  if (block == 1) return lattice.knots;
+  PixelGrid grid{static_cast<int>(camera.width), static_cast<int>(camera.height), {}};
+  grid.pixels.resize(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows));
+  const int cell_rows = lattice.knots.rows - 1;
+  for_each_row(cell_rows, threads, [&] {
+    return [&, caster = RayCaster(scene, camera)](int row, bool first) mutable {
+      for (int column = 0; column + 1 < lattice.knots.columns; ++column)
+        fill_cell(lattice.cell(column, row), camera, caster, grid);
+      if (first && progress) progress("drawing the picture", share + (1.0 - share) * (row + 1) / cell_rows);
+    };
+  });
+  return grid;
+}
+
+CastCost measure_cost(const Scene& scene, const Camera& camera, int block, int threads) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Lattice lattice = cast_lattice(scene, camera, block, threads, [](double) {});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  double uneven = 0.0;
+  double cells = 0.0;
+  for (int row = 0; row + 1 < lattice.knots.rows; ++row) {
+    for (int column = 0; column + 1 < lattice.knots.columns; ++column, ++cells) {
+      uneven += smooth(lattice.cell(column, row), camera) ? 0.0 : 1.0;
+    }
+  }
+  return {seconds / static_cast<double>(lattice.knots.pixels.size()), uneven / std::max(1.0, cells)};
+}
+
+std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most,
+                                  int threads) {
+  std::vector<std::pair<double, std::size_t>> candidates;
+  for (int y = 0; y < grid.rows; ++y) {
+    for (int x = 0; x < grid.columns; ++x) {
+      const double strength = edge_strength(grid, camera, x, y);
+      if (strength > least_bend) candidates.emplace_back(-strength, grid.index(x, y));
+    }
+  }
+  if (candidates.size() > most) {
+    std::nth_element(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(most), candidates.end());
+    candidates.resize(most);
+  }
+  // In the order of the image, so that a ray's hints serve the next one.
+  std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  std::vector<EdgePixel> edges(candidates.size());
+  constexpr std::size_t batch = 64;
+  for_each_row(static_cast<int>((edges.size() + batch - 1) / batch), threads, [&] {
+    return [&, caster = RayCaster(scene, camera)](int row, bool) mutable {
+      const std::size_t begin = static_cast<std::size_t>(row) * batch;
+      for (std::size_t i = begin; i < std::min(edges.size(), begin + batch); ++i) {
+        edges[i].index = candidates[i].second;
+        const auto columns = static_cast<std::size_t>(grid.columns);
+        const auto x = static_cast<double>(edges[i].index % columns);
+        const auto y = static_cast<double>(edges[i].index / columns);
+        for (int k = 0; k < 4; ++k)
+          edges[i].quarters[k] = caster.cast(x + (k % 2 ? 0.75 : 0.25), y + (k / 2 ? 0.75 : 0.25));
+      }
+    };
+  });
+  return edges;
+}
+
+}  // namespace asperity
