@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t leaf_cells = 4;
 
-std::uint64_t next_identity() {
+std::uint64_t next_field_identity() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
 }
@@ -133,7 +133,7 @@ ScalarField::ScalarField(std::shared_ptr<const SparseGrid> sparse, CellReconstru
 }
 
 void ScalarField::finish() {
-  identity_ = next_identity();
+  identity_ = next_field_identity();
   const GridAxes& finest = axes();
   for (int a = 0; a < 3; ++a) {
     bounds_.lower[a] = finest[static_cast<std::size_t>(a)].front();

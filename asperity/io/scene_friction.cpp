@@ -10,7 +10,7 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& formulation_names() {
+const std::vector<std::string>& friction_formulation_names() {
   static const std::vector<std::string> names{"literal", "consistent"};
   return names;
 }
@@ -29,7 +29,7 @@ class FrictionReader {
       }
     }
     if (printed_otherwise())
-      law_.formulation = static_cast<Formulation>(reader_.choice("formulation", formulation_names(), 1));
+      law_.formulation = static_cast<Formulation>(reader_.choice("formulation", friction_formulation_names(), 1));
     number("stiffness", Dimension::stiffness, Range::not_negative(), law_.stiffness);
     number("damping", Dimension::damping, Range::not_negative(), law_.damping);
     number("viscosity", Dimension::damping, Range::not_negative(), law_.viscosity);
@@ -81,7 +81,7 @@ void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
   ObjectReader reader(json, material.place_of("lay"), "lay");
   lay.still_ratio = reader.quantity("still_ratio", Dimension::ratio, 1.0, Range{0.0, 1.0});
   lay.sliding_ratio = reader.quantity("sliding_ratio", Dimension::ratio, lay.still_ratio, Range{0.0, 1.0});
-  lay.formulation = static_cast<Formulation>(reader.choice("formulation", formulation_names(), 1));
+  lay.formulation = static_cast<Formulation>(reader.choice("formulation", friction_formulation_names(), 1));
   if (reader.has("direction")) lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
   material.take("lay", std::move(reader));
 }

@@ -17,11 +17,11 @@ const std::vector<std::string>& blend_names() {
   static const std::vector<std::string> names{"none", "linear", "s_shape", "quintic"};
   return names;
 }
-const std::vector<std::string>& formulation_names() {
+const std::vector<std::string>& law_formulation_names() {
   static const std::vector<std::string> names{"literal", "consistent"};
   return names;
 }
-const std::vector<std::string>& channel_names() {
+const std::vector<std::string>& law_channel_names() {
   static const std::vector<std::string> names{"automatic", "luminance", "red", "green", "blue", "alpha"};
   return names;
 }
@@ -42,7 +42,7 @@ Result<std::vector<double>> read_blend_map(const SceneJson& json, const std::str
   ObjectReader reader(json, place, "blend map");
   const std::string file = reader.text("image", "");
   if (!reader.failed() && file.empty()) reader.fail("image", "is missing", "an image file");
-  const auto channel = static_cast<Channel>(reader.choice("channel", channel_names(), 0));
+  const auto channel = static_cast<Channel>(reader.choice("channel", law_channel_names(), 0));
   ASPERITY_CHECK(reader.status());
   const std::string path = context.resolve(file).string();
   ASPERITY_TRY(const Image image, read_image(path));
@@ -141,11 +141,11 @@ SceneJson law_json(const Law& law) {
   SceneJson json = SceneJson::object();
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     json["type"] = "height-field";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(height_field->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(height_field->formulation)];
     json["edge_taper"] = height_field->edge_taper;
   } else if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
     json["type"] = "mesostructure";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(meso->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(meso->formulation)];
     if (meso->formulation == Formulation::literal) {
       json["rho"] = meso->rho;
       json["blend"] = blend_json(meso->blend, meso->blend_map);
@@ -153,28 +153,28 @@ SceneJson law_json(const Law& law) {
     }
   } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
     json["type"] = "force-shading";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(shading->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(shading->formulation)];
   } else if (const auto* avila = std::get_if<AvilaLaw>(&law)) {
     json["type"] = "avila";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(avila->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(avila->formulation)];
     json["band"] = avila->band;
     json["largest_force"] = avila->largest_force;
     json["retarding"] = avila->retarding;
   } else if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) {
     json["type"] = "cross-uncross";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(cross->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(cross->formulation)];
     json["retarding"] = cross->retarding;
     if (cross->formulation == Formulation::literal) json["reach"] = cross->reach;
   } else if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) {
     json["type"] = "virtual-contact-point";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(contact->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(contact->formulation)];
     if (contact->formulation == Formulation::literal)
       json["magnitude"] = magnitude_names()[static_cast<std::size_t>(contact->magnitude)];
     json["depth_gain"] = contact->depth_gain;
     json["offset"] = contact->offset;
   } else if (const auto* magnetic = std::get_if<MagneticLaw>(&law)) {
     json["type"] = "magnetic";
-    json["formulation"] = formulation_names()[static_cast<std::size_t>(magnetic->formulation)];
+    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(magnetic->formulation)];
     json["band"] = magnetic->band;
   } else {
     json["type"] = law_name(law);
@@ -217,7 +217,7 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   if (!law) return std::move(law).error().at(place + ".type");
   const auto formulation = [&](Formulation fallback) {
     return static_cast<Formulation>(
-        reader.choice("formulation", formulation_names(), static_cast<std::size_t>(fallback)));
+        reader.choice("formulation", law_formulation_names(), static_cast<std::size_t>(fallback)));
   };
   if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
     meso->formulation = formulation(meso->formulation);

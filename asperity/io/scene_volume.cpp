@@ -17,7 +17,7 @@ namespace {
 
 using Samples = std::variant<ScalarGrid, VectorGrid>;
 
-const std::vector<std::string>& reconstruction_names() {
+const std::vector<std::string>& volume_reconstruction_names() {
   static const std::vector<std::string> names{"trilinear", "smooth"};
   return names;
 }
@@ -59,7 +59,7 @@ VolumeWords read_words(ObjectReader& reader) {
   }
   if (words.derive && component != nullptr) reader.refuse({"component"}, "beside \"derive\"");
   words.reconstruction = static_cast<CellReconstruction>(
-      reader.choice("reconstruction", reconstruction_names(), static_cast<std::size_t>(words.reconstruction)));
+      reader.choice("reconstruction", volume_reconstruction_names(), static_cast<std::size_t>(words.reconstruction)));
   return words;
 }
 

@@ -22,7 +22,7 @@ constexpr double touch_share = 0.5;     // of a skin: nearer than this is touche
 constexpr int most_samples = 4096;      // at which a field is measured
 constexpr double counted = 1.0 + 1e-6;  // rounding of what a field says of itself
 
-std::uint64_t next_identity() {
+std::uint64_t next_custom_identity() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
 }
@@ -88,7 +88,7 @@ Result<CustomSurface> CustomSurface::build(std::shared_ptr<const void> field, st
     return wrong("grain", fmt::format("is {}", facts.grain), "a length above 0 (m), or 0 for a default");
   if (facts.grain == 0.0) surface.facts_.grain = 0.01 * diagonal;
   surface.skin_ = std::min(1e-6 * diagonal, 1e-4 * surface.facts_.grain);
-  surface.identity_ = next_identity();
+  surface.identity_ = next_custom_identity();
   ASPERITY_CHECK(surface.measure());
   return surface;
 }

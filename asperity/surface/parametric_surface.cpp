@@ -24,7 +24,7 @@ constexpr std::size_t most_features = 16;
 // Share of the radius of curvature that features may use up.
 constexpr double most_of_radius = 0.95;
 
-std::uint64_t next_identity() {
+std::uint64_t next_parametric_identity() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
 }
@@ -114,7 +114,7 @@ Result<ParametricSurface> ParametricSurface::build(const ParametricSettings& set
   ASPERITY_CHECK(surface.measure());
   ASPERITY_CHECK(surface.check_features());
   surface.make_patches();
-  surface.identity_ = next_identity();
+  surface.identity_ = next_parametric_identity();
   return surface;
 }
 

@@ -61,7 +61,7 @@ bool hulls_apart(const ShellPrism& one, const std::array<Vec3, 6>& one_hull, con
   return false;
 }
 
-std::uint64_t next_identity() {
+std::uint64_t next_relief_identity() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
 }
@@ -94,7 +94,7 @@ std::string ReliefReport::advice() const {
 }
 
 ReliefSurface::ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest)
-    : identity_(next_identity()), base_(std::move(base)), rest_(std::move(rest)), coat_(std::move(coat)) {
+    : identity_(next_relief_identity()), base_(std::move(base)), rest_(std::move(rest)), coat_(std::move(coat)) {
   fit(ShellDirections::least_squares);
 }
 
