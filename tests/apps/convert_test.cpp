@@ -16,7 +16,7 @@
 #include "asperity/field/brick_store.h"
 #include "asperity/field/volume_generators.h"
 
-namespace asperity {
+namespace asperity::convert_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -126,4 +126,4 @@ TEST_F(Convert, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::convert_test

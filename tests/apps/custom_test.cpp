@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-namespace asperity {
+namespace asperity::custom_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -118,4 +118,4 @@ TEST_F(CustomPrograms, SurfaceIsTouchedDrawnAndInspected) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::custom_test

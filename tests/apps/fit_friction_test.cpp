@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-namespace asperity {
+namespace asperity::fit_friction_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,4 +120,4 @@ TEST_F(FitFriction, RefusesOneByOne) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::fit_friction_test

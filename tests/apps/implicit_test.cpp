@@ -14,7 +14,7 @@
 #include "asperity/geometry/generators.h"
 #include "asperity/io/mesh_io.h"
 
-namespace asperity {
+namespace asperity::implicit_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -121,4 +121,4 @@ TEST_F(ImplicitProgram, WhatDoesNotGoTogetherIsRefused) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::implicit_test

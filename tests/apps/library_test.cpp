@@ -16,7 +16,7 @@
 #include "asperity/field/mesostructure_library.h"
 #include "asperity/io/image_io.h"
 
-namespace asperity {
+namespace asperity::library_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -122,4 +122,4 @@ TEST_F(Library, RefusesWithOneMessage) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::library_test

@@ -18,7 +18,7 @@
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/trace_file.h"
 
-namespace asperity {
+namespace asperity::program_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -405,4 +405,4 @@ TEST_F(Program, AFailedRunKeepsTheOldOutput) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::program_test

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-namespace asperity {
+namespace asperity::score_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -154,4 +154,4 @@ TEST_F(Score, InspectAdvisesOnReliefs) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::score_test

@@ -9,7 +9,7 @@
 #include "asperity/core/frames.h"
 #include "asperity/core/samples.h"
 
-namespace asperity {
+namespace asperity::units_test {
 namespace {
 
 TEST(Units, EveryUnitBecomesSi) {
@@ -95,4 +95,4 @@ RC_GTEST_PROP(Pose, InverseUndoesItself, (int a, int b, int c)) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::units_test

@@ -11,7 +11,7 @@
 #include "asperity/device/simulated_device.h"
 #include "tests/device/surfaces.h"
 
-namespace asperity {
+namespace asperity::probe_test {
 namespace {
 
 static_assert(Device<IdealProbe> && Device<SimulatedDevice> && Device<ReplayDevice>);
@@ -354,4 +354,4 @@ TEST(ReplayDevice, GivesTheSamplesBackInOrder) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::probe_test

@@ -9,7 +9,7 @@
 #include "asperity/core/suggest.h"
 #include "asperity/device/hand.h"
 
-namespace asperity {
+namespace asperity::profile_test {
 namespace {
 
 TEST(Profile, EveryNameOfTheVocabularyIsThereOnceAndValid) {
@@ -134,4 +134,4 @@ TEST(Suggest, NearestNameIsEmptyWhenNothingIsNear) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::profile_test

@@ -9,7 +9,7 @@
 
 #include "tests/device/surfaces.h"
 
-namespace asperity {
+namespace asperity::stroke_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -264,4 +264,4 @@ TEST(Stroke, SurfaceThatGivesNothingIsAnError) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::stroke_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace asperity {
+namespace asperity::velocity_estimator_test {
 namespace {
 
 double rounded(double x, double step) {
@@ -121,4 +121,4 @@ TEST(VelocityEstimator, UnusableSamplesAreLeftOut) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::velocity_estimator_test

@@ -9,7 +9,7 @@
 
 #include "tests/field/brick_fixture.h"
 
-namespace asperity {
+namespace asperity::brick_file_test {
 namespace {
 
 using BrickFile = BrickFiles;
@@ -349,4 +349,4 @@ TEST_F(BrickFile, SizesThatLieAreRefusedBeforeAnythingIsAllocated) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::brick_file_test

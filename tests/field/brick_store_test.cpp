@@ -8,7 +8,7 @@
 
 #include "tests/field/brick_fixture.h"
 
-namespace asperity {
+namespace asperity::brick_store_test {
 namespace {
 
 constexpr std::size_t byte_brick = 42880;  // of uint8, as it lies in memory
@@ -291,4 +291,4 @@ TEST_F(BrickStoreTest, ADamagedBrickStaysMissing) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::brick_store_test

@@ -11,7 +11,7 @@
 
 #include "asperity/field/volume_generators.h"
 
-namespace asperity {
+namespace asperity::derived_fields_test {
 namespace {
 
 /// Velocity and its exact slopes.
@@ -373,4 +373,4 @@ TEST(DerivedFields, RefusesWhatIsNoField) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::derived_fields_test

@@ -12,7 +12,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::detail_pyramid_test {
 namespace {
 
 using std::numbers::pi;
@@ -374,4 +374,4 @@ TEST(DetailPyramid, KindsHaveNames) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::detail_pyramid_test

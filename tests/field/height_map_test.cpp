@@ -10,7 +10,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::height_map_test {
 namespace {
 
 using std::numbers::pi;
@@ -510,4 +510,4 @@ TEST(HeightMapBadInput, IsRefusedWithAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::height_map_test

@@ -13,7 +13,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/field/height_map.h"
 
-namespace asperity {
+namespace asperity::height_range_test {
 namespace {
 
 using std::numbers::pi;
@@ -379,4 +379,4 @@ TEST(HeightRange, TakesAtMostThreeQuartersOfTheMemoryOfTheValues) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::height_range_test

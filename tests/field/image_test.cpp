@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace asperity {
+namespace asperity::image_test {
 namespace {
 
 /// A 10 x 10 image whose pixels come from a function of the pixel's number.
@@ -85,4 +85,4 @@ TEST(ValidateImage, RefusesEachDefect) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::image_test

@@ -11,7 +11,7 @@
 #include "asperity/core/rng.h"
 #include "tests/field/sparse_grids.h"
 
-namespace asperity {
+namespace asperity::material_brush_test {
 namespace {
 
 constexpr double voxel = 1e-3;
@@ -24,8 +24,8 @@ const PointMaterial& own() {
 
 /// A ball of 16 mm.
 const SparseGrid& ball() {
-  static const auto grid = testing::sparse_grid([](const Vec3& p) { return testing::ball_distance(p, 0.016); },
-                                                testing::cube(0.016), voxel, 3.0 * voxel, 3.0 * voxel);
+  static const auto grid = test::sparse_grid([](const Vec3& p) { return test::ball_distance(p, 0.016); },
+                                                test::cube(0.016), voxel, 3.0 * voxel, 3.0 * voxel);
   return *grid;
 }
 
@@ -276,4 +276,4 @@ TEST(MaterialBrush, OnlyBricksThatItReachesTakeMemory) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::material_brush_test

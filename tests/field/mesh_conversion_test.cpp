@@ -12,7 +12,7 @@
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/generators.h"
 
-namespace asperity {
+namespace asperity::mesh_conversion_test {
 namespace {
 
 TriangleIndex index_of(MeshSource source) {
@@ -232,4 +232,4 @@ TEST_F(MeshConversion, FailuresOfTheConverterArePassedOn) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesh_conversion_test

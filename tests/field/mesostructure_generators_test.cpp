@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-namespace asperity {
+namespace asperity::mesostructure_generators_test {
 namespace {
 
 constexpr double amplitude = 1e-3;
@@ -589,4 +589,4 @@ TEST(GeneratedHeights, BadSpecificationsAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesostructure_generators_test

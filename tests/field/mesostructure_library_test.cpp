@@ -9,7 +9,7 @@
 
 #include "asperity/field/height_map.h"
 
-namespace asperity {
+namespace asperity::mesostructure_library_test {
 namespace {
 
 LibraryRelief made(const std::string& name, int size, std::uint64_t seed = 0) {
@@ -164,4 +164,4 @@ TEST(MesostructureLibrary, RefusesWithTheNearestName) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesostructure_library_test

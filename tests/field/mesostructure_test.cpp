@@ -9,7 +9,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/field/mesostructure_generators.h"
 
-namespace asperity {
+namespace asperity::mesostructure_test {
 namespace {
 
 constexpr double amplitude = 1e-3;
@@ -188,4 +188,4 @@ TEST(AgreementScale, DoesNotDependOnTheUnitOfTheScene) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesostructure_test

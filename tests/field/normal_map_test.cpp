@@ -9,7 +9,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::normal_map_test {
 namespace {
 
 using std::numbers::pi;
@@ -129,4 +129,4 @@ TEST(NormalMapSample, OppositeWallsMeetOutward) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::normal_map_test

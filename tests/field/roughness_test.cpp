@@ -10,7 +10,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::roughness_test {
 namespace {
 
 using std::numbers::pi;
@@ -206,4 +206,4 @@ TEST(FeltRoughness, OfLongProfilesTakesBoundedTime) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::roughness_test

@@ -7,7 +7,7 @@
 
 #include "tests/field/volumes.h"
 
-namespace asperity::testing {
+namespace asperity::test::scalar_field_test {
 namespace {
 
 TEST(GridAxis, LocatesEveryPlaceAsASearchDoes) {
@@ -307,4 +307,4 @@ TEST_P(EachReconstruction, FindsTheFirstRootOfACellLikeFineSteps) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::scalar_field_test

@@ -11,7 +11,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::solid_mesostructure_test {
 namespace {
 
 constexpr SolidKind all_kinds[] = {SolidKind::waves, SolidKind::lattice, SolidKind::rings, SolidKind::noise,
@@ -320,4 +320,4 @@ TEST(SolidMesostructure, KindsHaveNames) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::solid_mesostructure_test

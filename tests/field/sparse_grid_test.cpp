@@ -8,10 +8,10 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/field/volumes.h"
 
-namespace asperity {
+namespace asperity::sparse_grid_test {
 namespace {
 
-using testing::random_point;
+using test::random_point;
 
 constexpr double voxel = 0.001;
 
@@ -21,7 +21,7 @@ double wave(const Vec3& p) {
 }
 
 std::shared_ptr<const SparseGrid> wavy() {
-  return testing::sparse_grid(wave, testing::cube(0.03), voxel, 0.05, 0.05);
+  return test::sparse_grid(wave, test::cube(0.03), voxel, 0.05, 0.05);
 }
 
 /// The trilinear interpolant of f's nodes.
@@ -80,7 +80,7 @@ TEST(SparseGrid, NodeGradientsAreCentreDifferencesInterpolated) {
 }
 
 TEST(SparseGrid, BeyondTheBandLiesASideOfItsOwn) {
-  const auto grid = testing::sparse_ball(voxel, 0.004);
+  const auto grid = test::sparse_ball(voxel, 0.004);
   SparseHint hint;
   EXPECT_FLOAT_EQ(static_cast<float>(grid->trilinear(Vec3::Zero(), hint).value), -0.004F);
   EXPECT_FLOAT_EQ(static_cast<float>(grid->trilinear(Vec3(0.05, 0, 0), hint).value), 0.004F);
@@ -88,14 +88,14 @@ TEST(SparseGrid, BeyondTheBandLiesASideOfItsOwn) {
   EXPECT_FLOAT_EQ(static_cast<float>(grid->trilinear(Vec3(1, 1, 1), hint).value), 0.004F);
   EXPECT_FLOAT_EQ(static_cast<float>(grid->trilinear(Vec3(std::nan(""), 0, 0), hint).value), 0.004F);
   // A cavity: outside again, though it cannot be reached from outside.
-  const auto hollow = testing::sparse_grid([](const Vec3& p) { return std::abs(p.norm() - 0.04) - 0.01; },
-                                           testing::cube(0.05), voxel, 0.004, 0.004);
+  const auto hollow = test::sparse_grid([](const Vec3& p) { return std::abs(p.norm() - 0.04) - 0.01; },
+                                           test::cube(0.05), voxel, 0.004, 0.004);
   EXPECT_FLOAT_EQ(static_cast<float>(hollow->trilinear(Vec3::Zero(), hint).value), 0.004F);
   EXPECT_FLOAT_EQ(static_cast<float>(hollow->trilinear(Vec3(0.04, 0, 0), hint).value), -0.004F);
 }
 
 TEST(SparseGrid, TheValueIsContinuousIntoBricksThatAreNotStored) {
-  const auto grid = testing::sparse_ball(voxel, 0.004);
+  const auto grid = test::sparse_ball(voxel, 0.004);
   SparseHint hint;
   std::mt19937_64 generator(3);
   for (int n = 0; n < 2000; ++n) {
@@ -116,7 +116,7 @@ TEST_P(EveryReconstruction, EqualsTheSameSamplesOnADenseGrid) {
   const auto sparse = wavy();
   const ScalarField field(sparse, GetParam());
   const GridAxis axis = GridAxis::uniform(-0.032, voxel, 65).value();
-  const ScalarField dense(testing::sampled({axis, axis, axis}, wave), GetParam());
+  const ScalarField dense(test::sampled({axis, axis, axis}, wave), GetParam());
   std::mt19937_64 generator(4);
   CellPolynomial cell;
   CellPolynomial other;
@@ -132,7 +132,7 @@ TEST_P(EveryReconstruction, EqualsTheSameSamplesOnADenseGrid) {
 }
 
 TEST_P(EveryReconstruction, NoBrickIsLeftOutThatAThresholdMayBeIn) {
-  const ScalarField field(testing::sparse_ball(voxel, 0.006), GetParam());
+  const ScalarField field(test::sparse_ball(voxel, 0.006), GetParam());
   std::mt19937_64 generator(5);
   std::uniform_real_distribution<double> any(-0.0059, 0.0059);
   CellPolynomial cell;
@@ -160,7 +160,7 @@ INSTANTIATE_TEST_SUITE_P(Both, EveryReconstruction,
 
 TEST(SparseGrid, GoesThroughItsSourceUnchanged) {
   SparseSource source =
-      testing::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, testing::cube(0.01), voxel, 0.004, 0.004);
+      test::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, test::cube(0.01), voxel, 0.004, 0.004);
   std::uint32_t number = 0;
   for (SparseBlock& block : source.blocks) {
     block.face.resize(SparseBlock::points);
@@ -185,7 +185,7 @@ TEST(SparseGrid, GoesThroughItsSourceUnchanged) {
 
 TEST(SparseGrid, TheNearestPointTellsTheFace) {
   SparseSource source =
-      testing::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, testing::cube(0.01), voxel, 0.004, 0.004);
+      test::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, test::cube(0.01), voxel, 0.004, 0.004);
   const auto number = [](const Vec3& node) {
     return static_cast<std::uint32_t>(1000000.0 + node.x() + 100.0 * node.y() + 10000.0 * node.z());
   };
@@ -211,7 +211,7 @@ TEST(SparseGrid, TheNearestPointTellsTheFace) {
 
 TEST(SparseGrid, MaterialsAreInterpolatedAcrossBricks) {
   SparseSource source =
-      testing::sparse_source([](const Vec3& p) { return p.z(); }, testing::cube(0.02), voxel, 0.02, 0.02);
+      test::sparse_source([](const Vec3& p) { return p.z(); }, test::cube(0.02), voxel, 0.02, 0.02);
   const auto stiffness = [](const Vec3& p) { return 500.0 + 1e4 * p.x() + 2e4 * p.y() * p.y(); };
   for (SparseBlock& block : source.blocks) {
     if (block.at[0] < 0) continue;  // there the surface's own
@@ -249,7 +249,7 @@ TEST(SparseGrid, MaterialsAreInterpolatedAcrossBricks) {
 }
 
 TEST(SparseGrid, AnEditSharesWhatItDoesNotTouch) {
-  const auto grid = testing::sparse_ball(voxel, 0.004);
+  const auto grid = test::sparse_ball(voxel, 0.004);
   SparseSource source = grid->source();
   const std::size_t chosen = source.blocks.size() / 2;
   SparseBlock block = source.blocks[chosen];
@@ -281,7 +281,7 @@ class SparseGridErrors : public ::testing::TestWithParam<BadSource> {};
 
 TEST_P(SparseGridErrors, AreNamed) {
   SparseSource source =
-      testing::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, testing::cube(0.01), voxel, 0.004, 0.004);
+      test::sparse_source([](const Vec3& p) { return p.norm() - 0.01; }, test::cube(0.01), voxel, 0.004, 0.004);
   GetParam().spoil(source);
   const Result<SparseGrid> grid = SparseGrid::build(std::move(source));
   ASSERT_FALSE(grid);
@@ -321,4 +321,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.param.name; });
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::sparse_grid_test

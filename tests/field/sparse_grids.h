@@ -8,7 +8,7 @@
 
 #include "asperity/field/sparse_grid.h"
 
-namespace asperity::testing {
+namespace asperity::test {
 
 /// Everything of a potential f (m, positive outside) over a box: blocks that hold a point within the band.
 inline SparseSource sparse_source(const std::function<double(const Vec3&)>& f, const Box& box, double voxel,
@@ -94,4 +94,4 @@ inline std::shared_ptr<const SparseGrid> sparse_slab(double thickness, double ha
   return sparse_grid([size](const Vec3& p) { return box_distance(p, size); }, box, voxel, band, band);
 }
 
-}  // namespace asperity::testing
+}  // namespace asperity::test

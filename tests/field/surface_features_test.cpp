@@ -13,7 +13,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::surface_features_test {
 namespace {
 
 using std::numbers::pi;
@@ -604,4 +604,4 @@ TEST(SurfaceFeature, RefusesEachMemberByName) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::surface_features_test

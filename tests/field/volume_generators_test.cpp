@@ -9,7 +9,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace asperity {
+namespace asperity::volume_generators_test {
 namespace {
 
 constexpr VolumeKind all_kinds[] = {VolumeKind::cavity, VolumeKind::sphere, VolumeKind::shells,
@@ -228,4 +228,4 @@ TEST(VolumeGenerators, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::volume_generators_test

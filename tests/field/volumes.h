@@ -6,7 +6,7 @@
 
 #include "asperity/field/scalar_field.h"
 
-namespace asperity::testing {
+namespace asperity::test {
 
 /// Axis of `count` nodes over [low, high], stretched: cells grow by up to (1 + stretch) towards the middle.
 inline GridAxis stretched_axis(double low, double high, std::uint32_t count, double stretch) {
@@ -74,4 +74,4 @@ inline Vec3 random_point(std::mt19937_64& generator, double half) {
   return {x, y, unit(generator)};
 }
 
-}  // namespace asperity::testing
+}  // namespace asperity::test

@@ -11,7 +11,7 @@
 #include "asperity/geometry/triangle_index.h"
 #include "tests/geometry/random_meshes.h"
 
-namespace asperity {
+namespace asperity::bvh_test {
 namespace {
 
 Vec3 random_point(Rng& rng, const Box& box) {
@@ -232,4 +232,4 @@ TEST(SimdKernels, PlainAndBestAgree) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::bvh_test

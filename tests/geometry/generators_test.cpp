@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-namespace asperity {
+namespace asperity::generators_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -379,4 +379,4 @@ TEST(Generators, ParametersOutOfRangeStillGiveAMesh) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::generators_test

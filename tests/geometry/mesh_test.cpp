@@ -10,7 +10,7 @@
 
 #include "tests/geometry/random_meshes.h"
 
-namespace asperity {
+namespace asperity::mesh_test {
 namespace {
 
 TriangleMesh built(MeshSource source, const MeshBuildSettings& settings = {}) {
@@ -255,4 +255,4 @@ TEST(TriangleMesh, MemoryStaysSmall) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesh_test

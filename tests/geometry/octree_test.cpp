@@ -9,7 +9,7 @@
 
 #include "tests/geometry/random_meshes.h"
 
-namespace asperity {
+namespace asperity::octree_test {
 namespace {
 
 ClosestHit brute_force_closest(const TriangleMesh& mesh, const Vec3& p, double bound) {
@@ -266,4 +266,4 @@ TEST(SegmentTriangle, MissesBesideBeforeAndBehind) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::octree_test

@@ -10,7 +10,7 @@
 #include "asperity/geometry/mesh_refitter.h"
 #include "tests/geometry/random_meshes.h"
 
-namespace asperity {
+namespace asperity::refit_test {
 namespace {
 
 using Positions = std::vector<Vec3>;
@@ -404,4 +404,4 @@ TEST(Refit, ATriangleMayBeAlmostFlat) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::refit_test

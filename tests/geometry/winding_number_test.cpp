@@ -11,7 +11,7 @@
 
 #include "tests/geometry/random_meshes.h"
 
-namespace asperity {
+namespace asperity::winding_number_test {
 namespace {
 
 /// The solid angle by another formula than the program's: the spherical excess of the triangle seen (l'Huilier).
@@ -214,4 +214,4 @@ TEST(WindingNumber, IsNoughtWhereThePointIsNoPoint) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::winding_number_test

@@ -2,7 +2,7 @@
 
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::experiment_errors_test {
 namespace {
 
 class ExperimentErrors : public ExperimentTest {
@@ -277,4 +277,4 @@ TEST_F(ExperimentErrors, Strokes) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::experiment_errors_test

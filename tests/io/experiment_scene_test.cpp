@@ -6,7 +6,7 @@
 #include "asperity/field/mesh_conversion.h"
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::experiment_scene_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -472,4 +472,4 @@ TEST_F(ExperimentScene, RealMapsAndMeshes) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::experiment_scene_test

@@ -22,7 +22,7 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::experiment_schema_test {
 namespace {
 
 using nlohmann::json;
@@ -325,7 +325,7 @@ const Host hosts[] = {
 
 TEST_F(ExperimentSchema, EveryKeyIsReallyRead) {
   if (!has_mesh_voxelizer()) GTEST_SKIP() << "without OpenVDB nothing implicit is read";
-  ASSERT_TRUE(write_sparse(folder_ / "ball.vdb", *testing::sparse_ball(0.003, 0.012)).ok());
+  ASSERT_TRUE(write_sparse(folder_ / "ball.vdb", *test::sparse_ball(0.003, 0.012)).ok());
   GltfMaterial tiles;
   tiles.name = "tiles";
   tiles.height = GltfHeight{};
@@ -358,4 +358,4 @@ TEST_F(ExperimentSchema, EveryKeyIsReallyRead) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::experiment_schema_test

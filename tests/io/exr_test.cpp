@@ -11,7 +11,7 @@
 
 #include "asperity/io/image_io.h"
 
-namespace asperity {
+namespace asperity::exr_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -347,4 +347,4 @@ TEST(Exr, RealHeightStampsAreRead) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::exr_test

@@ -6,7 +6,7 @@
 
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::fine_scene_test {
 namespace {
 
 using std::numbers::pi;
@@ -675,4 +675,4 @@ TEST_F(FineScene, TheLayIsFeltByDirection) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::fine_scene_test

@@ -7,7 +7,7 @@
 
 #include "tests/io/gltf_builder.h"
 
-namespace asperity {
+namespace asperity::gltf_damage_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -303,4 +303,4 @@ TEST(Gltf, NoTruncationAndNoFlippedByteDoesHarm) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::gltf_damage_test

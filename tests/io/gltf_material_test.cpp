@@ -12,7 +12,7 @@
 #include "asperity/io/image_io.h"
 #include "tests/io/gltf_builder.h"
 
-namespace asperity {
+namespace asperity::gltf_material_test {
 namespace {
 
 using namespace test;
@@ -363,4 +363,4 @@ TEST(GltfMaterial, NoTruncationAndNoFlippedByteDoesHarm) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::gltf_material_test

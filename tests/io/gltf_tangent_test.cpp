@@ -13,7 +13,7 @@
 #include "asperity/io/gltf_material.h"
 #include "asperity/surface/coat.h"
 
-namespace asperity {
+namespace asperity::gltf_tangent_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -205,4 +205,4 @@ TEST(GltfTangents, ShearedAndMirroredCoordinatesKeepAnOrthogonalFrame) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::gltf_tangent_test

@@ -7,7 +7,7 @@
 #include "asperity/geometry/generators.h"
 #include "tests/io/gltf_builder.h"
 
-namespace asperity {
+namespace asperity::gltf_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -283,4 +283,4 @@ TEST(Gltf, ReadsRealFiles) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::gltf_test

@@ -12,7 +12,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/io/gltf_material.h"
 
-namespace asperity {
+namespace asperity::gltf_writer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -315,4 +315,4 @@ RC_GTEST_PROP(GltfWriter, FacesOfTheBuiltMeshAreFoundInTheSource, ()) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::gltf_writer_test

@@ -14,7 +14,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/field/mesostructure.h"
 
-namespace asperity {
+namespace asperity::image_io_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -404,4 +404,4 @@ TEST(RealMaps, NormalsOfAnotherPictureAreNamed) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::image_io_test

@@ -5,7 +5,7 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::implicit_scene_test {
 namespace {
 
 class ImplicitScene : public ExperimentTest {
@@ -223,4 +223,4 @@ TEST_F(ImplicitScene, LawsAndSurfacesThatDoNotGoTogetherAreNamed) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::implicit_scene_test

@@ -12,7 +12,7 @@
 #include "asperity/geometry/generators.h"
 #include "asperity/io/atomic_file.h"
 
-namespace asperity {
+namespace asperity::mesh_io_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -447,4 +447,4 @@ TEST_F(MeshFiles, UnwritableOutputIsNamedAndTheOldFileStays) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesh_io_test

@@ -11,7 +11,7 @@
 #include "asperity/io/mesh_io.h"
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::real_input_test {
 namespace {
 
 using namespace test;
@@ -217,4 +217,4 @@ TEST(RealInput, a_measured_surface_on_a_plane_is_followed_at_its_own_scale) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::real_input_test

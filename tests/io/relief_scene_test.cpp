@@ -7,7 +7,7 @@
 #include "asperity/io/gltf_material.h"
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::relief_scene_test {
 namespace {
 
 const std::filesystem::path shared = ASPERITY_SHARED_DATA;
@@ -250,4 +250,4 @@ TEST_F(ReliefScene, ExrHeightsAreMetresOrStretched) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_scene_test

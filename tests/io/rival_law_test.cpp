@@ -2,7 +2,7 @@
 
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::rival_law_test {
 namespace {
 
 class RivalLaw : public ExperimentTest {
@@ -67,4 +67,4 @@ TEST_F(RivalLaw, ABareMeshHasNoReliefToCut) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::rival_law_test

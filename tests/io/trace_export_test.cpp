@@ -13,7 +13,7 @@
 
 #include "asperity/io/recorded_path.h"
 
-namespace asperity {
+namespace asperity::trace_export_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -176,4 +176,4 @@ TEST(RecordedPath, MissingFileAndFolderAreErrorsWithTheirName) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::trace_export_test

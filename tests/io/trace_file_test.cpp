@@ -13,7 +13,7 @@
 #include <iterator>
 #include <limits>
 
-namespace asperity {
+namespace asperity::trace_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -407,4 +407,4 @@ TEST(TraceFileFuzz, ChecksumIsTheUsualCrc32) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::trace_file_test

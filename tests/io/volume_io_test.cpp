@@ -11,7 +11,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-namespace asperity {
+namespace asperity::volume_io_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -356,4 +356,4 @@ TEST_F(VolumeFiles, WithoutVtkTheErrorSaysWhatToInstall) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::volume_io_test

@@ -9,7 +9,7 @@
 #include "asperity/io/volume_io.h"
 #include "tests/io/experiment_fixture.h"
 
-namespace asperity {
+namespace asperity::volume_scene_test {
 namespace {
 
 class VolumeScene : public ExperimentTest {
@@ -318,4 +318,4 @@ TEST_F(VolumeScene, AnIsosurfaceIsTouched) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::volume_scene_test

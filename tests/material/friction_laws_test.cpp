@@ -9,7 +9,7 @@
 #include "asperity/material/friction.h"
 #include "tests/material/friction_rig.h"
 
-namespace asperity {
+namespace asperity::friction_laws_test {
 namespace {
 
 constexpr double push = 0.6;
@@ -407,4 +407,4 @@ TEST(LuGre, LiteralBristleDampingGivesEnergyAndConsistentDoesNot) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_laws_test

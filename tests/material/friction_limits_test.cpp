@@ -11,7 +11,7 @@
 #include "asperity/material/friction.h"
 #include "tests/material/friction_rig.h"
 
-namespace asperity {
+namespace asperity::friction_limits_test {
 namespace {
 
 /// Nearest point of the ellipse by trying angles, then finer around the best one.
@@ -165,4 +165,4 @@ TEST(Anisotropy, AGradientAlongTheNormalIsNoDirection) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_limits_test

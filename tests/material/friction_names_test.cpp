@@ -11,7 +11,7 @@
 #include "asperity/material/material.h"
 #include "tests/material/friction_rig.h"
 
-namespace asperity {
+namespace asperity::friction_names_test {
 namespace {
 
 TEST(FrictionNames, EveryKindIsFoundByItsName) {
@@ -174,4 +174,4 @@ TEST(MaterialValidate, EveryFieldIsChecked) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_names_test

@@ -10,7 +10,7 @@
 #include "asperity/material/friction.h"
 #include "tests/material/friction_rig.h"
 
-namespace asperity {
+namespace asperity::friction_properties_test {
 namespace {
 
 double log_uniform(Rng& rng, double low, double high) {
@@ -293,4 +293,4 @@ TEST(FrictionLaws, ABrokenTickIsNotRemembered) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_properties_test

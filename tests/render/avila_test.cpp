@@ -8,7 +8,7 @@
 #include "asperity/render/law_forces.h"
 #include "tests/render/volumes.h"
 
-namespace asperity {
+namespace asperity::avila_test {
 namespace {
 
 using volumes::cube;
@@ -215,4 +215,4 @@ TEST(AvilaLaw, NamesAndOptions) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::avila_test

@@ -9,13 +9,13 @@
 #include "asperity/render/step.h"
 #include "tests/field/volumes.h"
 
-namespace asperity {
+namespace asperity::brick_surface_test {
 namespace {
 
 using BrickSurface = BrickFiles;
 
 ScalarGrid wavy_sphere(std::uint32_t count) {
-  return testing::sampled(testing::cube_axes(0.05, count),
+  return test::sampled(test::cube_axes(0.05, count),
                           [](const Vec3& p) { return p.norm() + 0.0003 * std::sin(p.x() / 0.002); });
 }
 
@@ -146,4 +146,4 @@ TEST_F(BrickSurface, TheStreamingThreadBringsTheFinestLevel) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::brick_surface_test

@@ -10,7 +10,7 @@
 #include "asperity/geometry/mesh_refitter.h"
 #include "tests/render/sheets.h"
 
-namespace asperity::test {
+namespace asperity::test::change_test {
 namespace {
 
 // A coat that is swapped under a resting hand: the place goes along, what it would give is paid for, the force does not
@@ -408,4 +408,4 @@ TEST(Change, A_wave_that_rises_over_a_resting_hand_is_felt) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::change_test

@@ -8,7 +8,7 @@
 #include "asperity/geometry/generators.h"
 #include "tests/render/sheets.h"
 
-namespace asperity::test {
+namespace asperity::test::coat_material_test {
 namespace {
 
 std::shared_ptr<const MaterialMaps> map_for(MaterialChannel channel, double low, double high) {
@@ -339,4 +339,4 @@ TEST(View, Errors_name_what_is_wrong) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::coat_material_test

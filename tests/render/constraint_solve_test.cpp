@@ -5,7 +5,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::constraint_solve_test {
 namespace {
 
 using namespace test;
@@ -204,4 +204,4 @@ RC_GTEST_PROP(SolveConstraints, reaches_the_nearest_point_of_a_convex_cell_withi
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::constraint_solve_test

@@ -11,7 +11,7 @@
 #include "tests/render/textures.h"
 #include "tests/render/volumes.h"
 
-namespace asperity::test {
+namespace asperity::test::contact_friction_test {
 namespace {
 
 constexpr double push = 0.6;  // N
@@ -130,7 +130,7 @@ TEST(ContactFriction, The_default_is_the_proxys_own_and_equals_the_law_on_top) {
 
 TEST(ContactFriction, Felt_under_every_contact_law) {
   ImplicitParts parts;
-  parts.grid = testing::sparse_grid([](const Vec3& p) { return p.z(); },
+  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); },
                                     Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)}, 1e-3, 6e-3, 6e-3);
   const auto potential = std::make_shared<const ImplicitSurface>(must(ImplicitSurface::build(parts)));
   const auto volume =
@@ -348,4 +348,4 @@ TEST(ContactFriction, Lifting_off_forgets_the_stretch) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::contact_friction_test

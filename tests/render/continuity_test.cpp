@@ -10,7 +10,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::continuity_test {
 namespace {
 
 using namespace test;
@@ -352,4 +352,4 @@ TEST(T3_reconstruction, scan_lines_of_the_proxy_at_one_newton_are_the_relief) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::continuity_test

@@ -8,7 +8,7 @@
 #include "asperity/render/law_forces.h"
 #include "tests/render/volumes.h"
 
-namespace asperity {
+namespace asperity::cross_uncross_test {
 namespace {
 
 using volumes::cube;
@@ -413,4 +413,4 @@ TEST(CrossUncrossLaw, NamesAndOptions) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::cross_uncross_test

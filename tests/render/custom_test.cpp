@@ -10,7 +10,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/surface/custom_fields.h"
 
-namespace asperity {
+namespace asperity::custom_test {
 namespace {
 
 using namespace test;
@@ -420,4 +420,4 @@ TEST(CustomLaw, ScenesRefuseWhatItDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::custom_test

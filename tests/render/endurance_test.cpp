@@ -4,7 +4,7 @@
 
 #include "tests/render/analytic_relief.h"
 
-namespace asperity::test {
+namespace asperity::test::endurance_test {
 namespace {
 
 struct Endurance {
@@ -83,4 +83,4 @@ TEST(Endurance, triplanar_waves_on_icospheres_of_many_sizes) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::endurance_test

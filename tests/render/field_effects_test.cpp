@@ -9,7 +9,7 @@
 
 #include "tests/render/volumes.h"
 
-namespace asperity {
+namespace asperity::field_effects_test {
 namespace {
 
 using volumes::cube;
@@ -279,4 +279,4 @@ TEST(FieldEffect, NamesAreInTheOrderOfTheKinds) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::field_effects_test

@@ -4,7 +4,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::force_shading_test {
 namespace {
 
 using namespace test;
@@ -119,4 +119,4 @@ TEST(ForceShadingConsistent, resists_the_way_up_and_keeps_the_push) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::force_shading_test

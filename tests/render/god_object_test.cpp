@@ -9,7 +9,7 @@
 #include "asperity/geometry/generators.h"
 #include "asperity/render/step.h"
 
-namespace asperity {
+namespace asperity::god_object_test {
 namespace {
 
 constexpr double stiffness = 1000.0;
@@ -324,4 +324,4 @@ TEST(GodObject, DampingNeverPullsInward) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::god_object_test

@@ -5,7 +5,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::height_field_test {
 namespace {
 
 using namespace test;
@@ -202,4 +202,4 @@ TEST(Damping, pushes_against_going_in_and_never_pulls_back) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::height_field_test

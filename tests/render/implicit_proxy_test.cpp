@@ -8,7 +8,7 @@
 #include "tests/field/volumes.h"
 #include "tests/render/implicits.h"
 
-namespace asperity::testing {
+namespace asperity::test::implicit_proxy_test {
 namespace {
 
 constexpr double degrees = 57.29577951308232;
@@ -339,4 +339,4 @@ TEST(ImplicitProxy, NormalPerturbationAndAnOffsetDoNotGoTogether) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::implicit_proxy_test

@@ -11,10 +11,10 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/render/fixtures.h"
 
-namespace asperity::test {
+namespace asperity::test::implicit_texture_test {
 namespace {
 
-using asperity::testing::box_distance;
+using asperity::test::box_distance;
 
 constexpr double voxel = 0.5e-3;
 constexpr double half = 0.02;
@@ -31,7 +31,7 @@ std::shared_ptr<const SparseGrid> edge() {
   Box box;
   box.lower = Vec3(0.008, -0.004, 0.008);
   box.upper = Vec3(half, 0.01, half);
-  return asperity::testing::sparse_grid([](const Vec3& p) { return box_distance(p, Vec3::Constant(half)); }, box, voxel,
+  return asperity::test::sparse_grid([](const Vec3& p) { return box_distance(p, Vec3::Constant(half)); }, box, voxel,
                                         4.0 * voxel, 4.0 * voxel);
 }
 
@@ -94,4 +94,4 @@ TEST(ImplicitTexture, K_8_ForceOnACornerChangesWithTheStepAndNeverJumps) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::implicit_texture_test

@@ -7,7 +7,7 @@
 #include "asperity/render/step.h"
 #include "tests/field/sparse_grids.h"
 
-namespace asperity::testing {
+namespace asperity::test {
 
 inline Instance implicit_instance(std::shared_ptr<const SparseGrid> grid, const Law& law = ProxyLaw{},
                                   CellReconstruction reconstruction = CellReconstruction::smooth, double offset = 0.0) {
@@ -26,4 +26,4 @@ inline ForceSample touch_at(const Scene& scene, ProxyState& state, const Vec3& p
   return step(scene, state, probe, Seconds(dt));
 }
 
-}  // namespace asperity::testing
+}  // namespace asperity::test

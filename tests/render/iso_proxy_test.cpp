@@ -8,7 +8,7 @@
 #include "asperity/render/step.h"
 #include "tests/field/volumes.h"
 
-namespace asperity::testing {
+namespace asperity::test::iso_proxy_test {
 namespace {
 
 constexpr double degrees = 57.29577951308232;
@@ -503,4 +503,4 @@ TEST(IsoProxy, LawsThatNeedTrianglesAreRefused) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::iso_proxy_test

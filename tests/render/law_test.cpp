@@ -7,7 +7,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::law_test {
 namespace {
 
 using namespace test;
@@ -295,4 +295,4 @@ TEST(Determinism, the_same_path_twice_gives_the_same_bits) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::law_test

@@ -5,7 +5,7 @@
 
 #include "tests/render/implicit_touch.h"
 
-namespace asperity {
+namespace asperity::magnetic_test {
 namespace {
 
 using implicit::far_outside;
@@ -22,7 +22,7 @@ constexpr double half = 0.02;  // m, of the box
 constexpr double band = 3e-3;  // m, of attraction
 
 std::shared_ptr<const ImplicitSurface> box() {
-  static const auto surface = surface_of(testing::sparse_box(voxel, 8e-3));
+  static const auto surface = surface_of(test::sparse_box(voxel, 8e-3));
   return surface;
 }
 
@@ -87,7 +87,7 @@ TEST(Magnetic, K_7_InAndOutAgainDoesNoWork) {
 
 TEST(Magnetic, T_1_OursDoesNoWorkInAClosedLoop) {
   const std::array<std::pair<std::shared_ptr<const ImplicitSurface>, Vec3>, 3> cases = {{
-      {surface_of(testing::sparse_ball(voxel, 8e-3)), Vec3(0.0, 0.0, 0.031)},
+      {surface_of(test::sparse_ball(voxel, 8e-3)), Vec3(0.0, 0.0, 0.031)},
       {box(), Vec3(half, 0.0, half)},
       {box(), Vec3(half, half, half)},
   }};
@@ -185,8 +185,8 @@ TEST(Magnetic, DampingTakesEnergyOnBothSidesAndFadesWithTheBand) {
 
 TEST(Magnetic, ChangesOfStiffnessGiveNoMoreThanTheyTook) {
   SparseSource source =
-      testing::sparse_source([](const Vec3& p) { return testing::box_distance(p, Vec3::Constant(half)); },
-                             testing::cube(half), voxel, 6e-3, 6e-3);
+      test::sparse_source([](const Vec3& p) { return test::box_distance(p, Vec3::Constant(half)); },
+                             test::cube(half), voxel, 6e-3, 6e-3);
   for (SparseBlock& block : source.blocks) {
     block.material.resize(SparseBlock::points);
     for (int n = 0; n < static_cast<int>(SparseBlock::points); ++n) {
@@ -227,4 +227,4 @@ TEST(Magnetic, ProbesThatMeanNothingAreNotFelt) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::magnetic_test

@@ -5,7 +5,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::mesostructure_test {
 namespace {
 
 using namespace test;
@@ -233,4 +233,4 @@ TEST(MesostructureConsistent, a_face_round_a_sharp_corner_says_nothing_about_the
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesostructure_test

@@ -4,7 +4,7 @@
 
 #include "tests/render/implicit_touch.h"
 
-namespace asperity {
+namespace asperity::normal_perturbation_test {
 namespace {
 
 using implicit::angle_between;
@@ -17,7 +17,7 @@ constexpr double amplitude = 0.2e-3;  // m
 constexpr double wavelength = 8e-3;   // m
 
 double box_at(const Vec3& p) {
-  return testing::box_distance(p, Vec3::Constant(half));
+  return test::box_distance(p, Vec3::Constant(half));
 }
 /// Waves along x + z, so that top and side carry them.
 double wave(const Vec3& p) {
@@ -31,9 +31,9 @@ double wave_slope(const Vec3& p) {
 std::shared_ptr<const ImplicitSurface> textured_box() {
   ImplicitParts parts;
   const double band = 5e-3;
-  parts.untextured = testing::sparse_grid(box_at, testing::cube(half), voxel, band, band);
+  parts.untextured = test::sparse_grid(box_at, test::cube(half), voxel, band, band);
   parts.grid =
-      testing::sparse_grid([](const Vec3& p) { return box_at(p) - wave(p); }, testing::cube(half), voxel, band, band);
+      test::sparse_grid([](const Vec3& p) { return box_at(p) - wave(p); }, test::cube(half), voxel, band, band);
   parts.mesh =
       std::make_shared<const MeshSurface>(TriangleIndex::build(test::mesh_of(box_mesh(Vec3::Constant(2.0 * half)))));
   return std::make_shared<const ImplicitSurface>(test::must(ImplicitSurface::build(std::move(parts))));
@@ -147,4 +147,4 @@ TEST(NormalPerturbation, StepAddsTheMaterialsDamping) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::normal_perturbation_test

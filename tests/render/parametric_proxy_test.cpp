@@ -9,7 +9,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/render/step.h"
 
-namespace asperity::testing {
+namespace asperity::test::parametric_proxy_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -418,4 +418,4 @@ TEST(ParametricProxy, AChangedSceneTakesTheProbeOutOfTheFront) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::parametric_proxy_test

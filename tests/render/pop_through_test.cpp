@@ -8,7 +8,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::pop_through_test {
 namespace {
 
 using namespace test;
@@ -54,7 +54,7 @@ const std::vector<Closed>& closed_reliefs() {
 const Tessellation& dense(std::size_t which) {
   static const std::vector<Tessellation> all = [] {
     std::vector<Tessellation> made;
-    for (const Closed& one : closed_reliefs()) made.push_back(tessellate(*one.surface, one.cells));
+    for (const Closed& one : closed_reliefs()) made.push_back(dense_net(*one.surface, one.cells));
     return made;
   }();
   return all[which];
@@ -230,4 +230,4 @@ TEST(T5_pop_through, a_proxy_on_an_open_sheet_passes_only_around_its_rim) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::pop_through_test

@@ -10,7 +10,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::proxy_test {
 namespace {
 
 using namespace test;
@@ -282,7 +282,7 @@ TEST(ProxyTogether, a_relief_against_a_mesh_holds_the_proxy_in_their_crease) {
 
 TEST(ProxyBall, rests_its_radius_away_from_the_relief) {
   const auto surface = relief_on(mesh_of(plane_grid(0.02, 0.02, 2, 2)), {tiled(wavy_map(amplitude, 16))}, {});
-  const Tessellation dense = tessellate(*surface, 160);
+  const Tessellation dense = dense_net(*surface, 160);
   Rng rng(62);
   for (const double radius : {1e-4, 5e-4, 1.5e-3}) {
     const Scene scene = must(Scene::build({instance_of(surface)}, radius));
@@ -370,4 +370,4 @@ TEST(ProxyEnergy, a_relief_that_rises_over_a_resting_probe_gives_no_more_than_wa
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::proxy_test

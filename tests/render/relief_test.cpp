@@ -7,7 +7,7 @@
 
 #include "tests/render/analytic_relief.h"
 
-namespace asperity::test {
+namespace asperity::test::relief_test {
 namespace {
 
 struct Truth {
@@ -83,4 +83,4 @@ TEST(ReliefTruth, displaced_sphere_on_a_coarse_base) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::relief_test

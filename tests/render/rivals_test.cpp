@@ -8,7 +8,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/render/oracle.h"
 
-namespace asperity {
+namespace asperity::rivals_test {
 namespace {
 
 using namespace test;
@@ -527,4 +527,4 @@ TEST(DenseOracleTest, the_relief_is_first_crossed_where_the_facets_say) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::rivals_test

@@ -4,7 +4,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::rows_test {
 namespace {
 
 using namespace test;
@@ -369,4 +369,4 @@ TEST(H_edge, with_the_linear_blend_halving_the_step_halves_the_change_of_height)
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::rows_test

@@ -4,7 +4,7 @@
 
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::scene_test {
 namespace {
 
 using namespace test;
@@ -154,4 +154,4 @@ TEST(SceneTest, a_moved_and_turned_instance_feels_as_one_at_the_origin) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::scene_test

@@ -10,7 +10,7 @@
 #include "tests/render/textures.h"
 #include "tests/render/volumes.h"
 
-namespace asperity::test {
+namespace asperity::test::texture_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -281,7 +281,7 @@ TEST(Texture, The_same_on_every_provider) {
   const auto volume =
       volumes::surface_of(volumes::sampled(volumes::cube(0.03, 31), [](const Vec3& p) { return p.z(); }), 0.0);
   ImplicitParts parts;
-  parts.grid = testing::sparse_grid([](const Vec3& p) { return p.z(); },
+  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); },
                                     Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)}, 1e-3, 6e-3, 6e-3);
   const auto potential = std::make_shared<const ImplicitSurface>(must(ImplicitSurface::build(parts)));
   ParametricSettings formula;
@@ -471,4 +471,4 @@ TEST(Texture, Bad_settings_are_named) {
 }
 
 }  // namespace
-}  // namespace asperity::test
+}  // namespace asperity::test::texture_test

@@ -6,7 +6,7 @@
 
 #include "tests/render/implicit_touch.h"
 
-namespace asperity {
+namespace asperity::virtual_contact_point_test {
 namespace {
 
 using implicit::angle_between;
@@ -22,14 +22,14 @@ constexpr double voxel = 1e-3;
 constexpr double half = 0.02;  // m, of the box
 
 std::shared_ptr<const ImplicitSurface> box(CellReconstruction reconstruction = CellReconstruction::smooth) {
-  static const auto grid = testing::sparse_box(voxel, 8e-3);
+  static const auto grid = test::sparse_box(voxel, 8e-3);
   static const auto smooth = surface_of(grid);
   static const auto trilinear = surface_of(grid, CellReconstruction::trilinear);
   return reconstruction == CellReconstruction::smooth ? smooth : trilinear;
 }
 /// The same with little beneath its surface: trusted 3 mm deep, and held from 2 mm on.
 std::shared_ptr<const ImplicitSurface> thin_banded() {
-  static const auto surface = surface_of(testing::sparse_box(voxel, 5e-3));
+  static const auto surface = surface_of(test::sparse_box(voxel, 5e-3));
   return surface;
 }
 
@@ -179,7 +179,7 @@ TEST(VirtualContactPoint, K_4_SizeNearAnEdge) {
 
 TEST(VirtualContactPoint, BallPushesAlongItsRadius) {
   for (const Formulation formulation : {Formulation::literal, Formulation::consistent}) {
-    PointTouch touch{surface_of(testing::sparse_ball(voxel, 6e-3)), with(formulation), {}};
+    PointTouch touch{surface_of(test::sparse_ball(voxel, 6e-3)), with(formulation), {}};
     Rng rng(7);
     for (int i = 0; i < 200; ++i) {
       const Vec3 way = Vec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized();
@@ -324,16 +324,16 @@ void expect_passive(const std::shared_ptr<const ImplicitSurface>& surface, const
 }
 
 TEST(VirtualContactPoint, FrictionGivesNoEnergy) {
-  const auto ball = surface_of(testing::sparse_ball(voxel, 6e-3));
+  const auto ball = surface_of(test::sparse_ball(voxel, 6e-3));
   const auto cube = box();
   const auto plain = box(CellReconstruction::trilinear);
-  const auto plate = surface_of(testing::sparse_slab(3e-3, 5e-3, 0.5e-3, 4e-3));
+  const auto plate = surface_of(test::sparse_slab(3e-3, 5e-3, 0.5e-3, 4e-3));
   // No distance any more: its slope is up to 1.6.
-  const auto rough = surface_of(testing::sparse_grid(
+  const auto rough = surface_of(test::sparse_grid(
       [](const Vec3& p) {
-        return testing::ball_distance(p, 0.03) + 0.6e-3 * std::sin(1e3 * p.x()) * std::sin(1e3 * p.z());
+        return test::ball_distance(p, 0.03) + 0.6e-3 * std::sin(1e3 * p.x()) * std::sin(1e3 * p.z());
       },
-      testing::cube(0.03), voxel, 6e-3, 6e-3));
+      test::cube(0.03), voxel, 6e-3, 6e-3));
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     expect_passive(ball, Vec3(0.0, 0.0, 0.0295), seed);
     expect_passive(cube, Vec3(half, 0.002, half), seed);
@@ -358,7 +358,7 @@ double strength(PointTouch touch) {
 }
 
 TEST(VirtualContactPoint, K_6_OffsetGivesAThinSlabItsStrength) {
-  const auto slab = testing::sparse_slab(0.5e-3, 2.5e-3, 0.125e-3, 1.5e-3);
+  const auto slab = test::sparse_slab(0.5e-3, 2.5e-3, 0.125e-3, 1.5e-3);
   for (const double offset : {0.0, 1e-3}) {
     const double expected = stiffness * (offset + 0.25e-3);
     PointTouch printed{surface_of(slab), with(Formulation::literal), {}};
@@ -395,7 +395,7 @@ TEST(VirtualContactPoint, OffsetTakesDirectionAndPlaceFromTheOriginalSurface) {
 
 TEST(VirtualContactPoint, T_1_OursDoesNoWorkInAClosedLoop) {
   const std::array<std::pair<std::shared_ptr<const ImplicitSurface>, Vec3>, 4> cases = {{
-      {surface_of(testing::sparse_ball(voxel, 8e-3)), Vec3(0.0, 0.0, 0.0295)},
+      {surface_of(test::sparse_ball(voxel, 8e-3)), Vec3(0.0, 0.0, 0.0295)},
       {box(), Vec3(half - 1e-3, 0.0, half - 1e-3)},
       {box(), Vec3(half - 1e-3, half - 1e-3, half - 1e-3)},
       {box(CellReconstruction::trilinear), Vec3(half - 1e-3, half - 1e-3, half - 1e-3)},
@@ -467,13 +467,13 @@ TEST(VirtualContactPoint, BeyondTheBandItHoldsWithoutGivingEnergy) {
 TEST(VirtualContactPoint, HeldUnderAHigherPartItGivesNoMoreThanItTook) {
   // A step: whoever comes in through its lower part and rises under the higher one is held upwards all the way.
   const auto step_distance = [](const Vec3& p) {
-    return std::min(testing::box_distance(p, Vec3(0.03, 0.015, 0.015)),
-                    testing::box_distance(p - Vec3(0.015, 0.0, 0.01), Vec3(0.015, 0.015, 0.025)));
+    return std::min(test::box_distance(p, Vec3(0.03, 0.015, 0.015)),
+                    test::box_distance(p - Vec3(0.015, 0.0, 0.01), Vec3(0.015, 0.015, 0.025)));
   };
   Box bounds;
   bounds.lower = Vec3(-0.03, -0.015, -0.015);
   bounds.upper = Vec3(0.03, 0.015, 0.035);
-  PointTouch touch{surface_of(testing::sparse_grid(step_distance, bounds, voxel, 5e-3, 5e-3)), {}, {}};
+  PointTouch touch{surface_of(test::sparse_grid(step_distance, bounds, voxel, 5e-3, 5e-3)), {}, {}};
   const std::array<Vec3, 5> corners = {Vec3(-0.012, 0.0, 0.038), Vec3(-0.012, 0.0, 0.008), Vec3(0.015, 0.0, 0.008),
                                        Vec3(0.015, 0.0, 0.038), Vec3(-0.012, 0.0, 0.038)};
   std::vector<Vec3> path;
@@ -498,8 +498,8 @@ TEST(VirtualContactPoint, AProbeThatJumpsOverTheBandIsHeldWhereItCameIn) {
 
 /// A box whose stiffness rises along x, from 500 N/m to 1500 N/m around x = 0.
 std::shared_ptr<const ImplicitSurface> half_soft() {
-  const auto distance = [](const Vec3& p) { return testing::box_distance(p, Vec3::Constant(half)); };
-  SparseSource source = testing::sparse_source(distance, testing::cube(half), voxel, 6e-3, 6e-3);
+  const auto distance = [](const Vec3& p) { return test::box_distance(p, Vec3::Constant(half)); };
+  SparseSource source = test::sparse_source(distance, test::cube(half), voxel, 6e-3, 6e-3);
   for (SparseBlock& block : source.blocks) {
     block.material.resize(SparseBlock::points);
     for (int n = 0; n < static_cast<int>(SparseBlock::points); ++n) {
@@ -608,4 +608,4 @@ TEST(VirtualContactPoint, StepFeelsTheSame) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::virtual_contact_point_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace asperity {
+namespace asperity::safety_stage_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -188,4 +188,4 @@ TEST(SafetyStage, AVolumesForceIsNoStartInside) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::safety_stage_test

@@ -31,7 +31,7 @@ std::atomic<int> allocations{0};
   std::free(memory);
 }
 
-namespace asperity {
+namespace asperity::session_test {
 namespace {
 
 SurfacePoint on_plane(const Vec3& p) {
@@ -197,4 +197,4 @@ TEST(Session, TicksCoverADuration) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::session_test

@@ -6,7 +6,7 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/study/synthetic.h"
 
-namespace asperity {
+namespace asperity::exact_geometry_test {
 namespace {
 
 using namespace synthetic;
@@ -20,7 +20,7 @@ std::shared_ptr<const MeshSurface> box() {
 
 Scene potential_scene(const std::shared_ptr<const MeshSurface>& mesh, double offset = 0.0) {
   return scene_of(
-      std::make_shared<const ImplicitSurface>(ImplicitSurface::build({testing::sparse_box(0.0005, 0.003), nullptr, mesh,
+      std::make_shared<const ImplicitSurface>(ImplicitSurface::build({test::sparse_box(0.0005, 0.003), nullptr, mesh,
                                                                       CellReconstruction::smooth, offset})
                                                   .value()),
       ProxyLaw{});
@@ -93,4 +93,4 @@ TEST(ExactGeometry, AnotherScenesSurfacesMayJudge) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::exact_geometry_test

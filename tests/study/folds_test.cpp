@@ -12,7 +12,7 @@
 #include "tests/render/fixtures.h"
 #include "tests/surface/folded.h"
 
-namespace asperity {
+namespace asperity::folds_test {
 namespace {
 
 using namespace test;
@@ -318,4 +318,4 @@ TEST(H_conc, over_gentle_rings_the_literal_force_jumps_and_the_pre_blended_ones_
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::folds_test

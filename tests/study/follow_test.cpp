@@ -16,7 +16,7 @@
 #include "tests/render/volumes.h"
 #include "tests/study/synthetic.h"
 
-namespace asperity {
+namespace asperity::follow_test {
 namespace {
 
 using volumes::cube;
@@ -339,4 +339,4 @@ TEST(IsosurfacePicture, FramesTheSurfaceAndNotTheVolume) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::follow_test

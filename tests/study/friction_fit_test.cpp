@@ -12,7 +12,7 @@
 #include "asperity/study/nlopt/nlopt_minimiser.h"
 #endif
 
-namespace asperity {
+namespace asperity::friction_fit_test {
 namespace {
 
 FrictionTrace made_by(FrictionKind kind, double stiffness, double speed) {
@@ -200,4 +200,4 @@ TEST(FrictionFit, FindsWhatTheTracesWereMadeWith) {
 #endif
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_fit_test

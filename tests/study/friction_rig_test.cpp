@@ -12,7 +12,7 @@
 #include <fstream>
 #include <numbers>
 
-namespace asperity {
+namespace asperity::friction_rig_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -306,4 +306,4 @@ TEST(MeasuredFriction, IsStickSlipWhereItIsSlowAndSoftAndSwingsWhereItIsFast) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::friction_rig_test

@@ -5,14 +5,14 @@
 #include "asperity/render/step.h"
 #include "tests/field/volumes.h"
 
-namespace asperity {
+namespace asperity::loop_rate_test {
 namespace {
 
 Instance sphere(std::uint32_t count) {
   Instance instance;
   instance.name = "sphere";
   instance.surface =
-      std::make_shared<const IsoSurface>(IsoSurface::build(testing::sphere_field(count), 0.03, Inside::low).value());
+      std::make_shared<const IsoSurface>(IsoSurface::build(test::sphere_field(count), 0.03, Inside::low).value());
   return instance;
 }
 
@@ -58,4 +58,4 @@ TEST(LoopRate, LeavesOutSizesThatLoseTheSurface) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::loop_rate_test

@@ -7,7 +7,7 @@
 
 #include "tests/study/synthetic.h"
 
-namespace asperity {
+namespace asperity::metrics_test {
 namespace {
 
 using namespace synthetic;
@@ -207,4 +207,4 @@ RC_GTEST_PROP(Percentile, IsAValueThatTheShareDoesNotExceed, ()) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::metrics_test

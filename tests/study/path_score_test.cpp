@@ -13,7 +13,7 @@
 #include "asperity/study/path_score.h"
 #include "tests/render/fixtures.h"
 
-namespace asperity {
+namespace asperity::path_score_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -307,4 +307,4 @@ TEST(PathScore, PageHoldsItsNumbersAndNoMarkupOfNames) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::path_score_test

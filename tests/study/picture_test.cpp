@@ -7,7 +7,7 @@
 #include "asperity/study/detail/ray_cast.h"
 #include "tests/study/synthetic.h"
 
-namespace asperity {
+namespace asperity::picture_test {
 namespace {
 
 using namespace synthetic;
@@ -165,4 +165,4 @@ TEST(ForceColour, BrightensEvenlyFromEndToEnd) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::picture_test

@@ -14,7 +14,7 @@
 #include "asperity/io/image_io.h"
 #include "asperity/study/renderability.h"
 
-namespace asperity {
+namespace asperity::renderability_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -327,4 +327,4 @@ TEST(Renderability, MeasuredTopographies) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::renderability_test

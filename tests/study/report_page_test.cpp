@@ -12,7 +12,7 @@
 
 #include "tests/study/reports.h"
 
-namespace asperity {
+namespace asperity::report_page_test {
 namespace {
 
 using namespace synthetic;
@@ -126,4 +126,4 @@ TEST_F(ReportPage, RunWithoutContactStillOpens) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::report_page_test

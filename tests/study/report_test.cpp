@@ -10,7 +10,7 @@
 
 #include "tests/study/reports.h"
 
-namespace asperity {
+namespace asperity::report_test {
 namespace {
 
 using namespace synthetic;
@@ -202,4 +202,4 @@ TEST(WriteReport, WritesThePageAndLeavesNothingBeside) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::report_test

@@ -10,7 +10,7 @@
 
 #include "asperity/field/mesostructure_generators.h"
 
-namespace asperity {
+namespace asperity::sampling_laws_test {
 namespace {
 
 /// What a probe that follows the map along s finds. Exact for a bilinear map: it is straight between texel centres.
@@ -103,4 +103,4 @@ TEST(SamplingLaws, H_III_AsymmetryChangesSignWithTheDirection) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::sampling_laws_test

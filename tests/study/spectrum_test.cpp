@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace asperity {
+namespace asperity::spectrum_test {
 namespace {
 
 std::vector<double> sine(double frequency, double amplitude, double spacing, std::size_t count) {
@@ -76,4 +76,4 @@ TEST(Resample, SamplesThatStandStillOrAreNoNumberAreLeftOut) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::spectrum_test

@@ -8,7 +8,7 @@
 
 #include "tests/surface/folded.h"
 
-namespace asperity {
+namespace asperity::closing_test {
 namespace {
 
 using namespace test;
@@ -219,4 +219,4 @@ TEST(Closing, refuses_what_it_cannot_do) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::closing_test

@@ -6,7 +6,7 @@
 #include "asperity/field/image.h"
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::coat_test {
 namespace {
 
 using namespace test;
@@ -248,4 +248,4 @@ TEST(BarycentricFrameTest, coordinates_and_height_undo_the_point) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::coat_test

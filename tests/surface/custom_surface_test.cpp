@@ -8,7 +8,7 @@
 #include "asperity/surface/parametric_surface.h"
 #include "tests/surface/custom_fields.h"
 
-namespace asperity {
+namespace asperity::custom_surface_test {
 namespace {
 
 using namespace test;
@@ -259,4 +259,4 @@ TEST(CustomSurface, RegisteredTypesAreMadeOfTheirNumbers) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::custom_surface_test

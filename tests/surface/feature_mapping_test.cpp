@@ -13,7 +13,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
 
-namespace asperity {
+namespace asperity::feature_mapping_test {
 namespace {
 
 using std::numbers::pi;
@@ -479,4 +479,4 @@ TEST(FeatureMapping, RefusesEachMemberByName) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::feature_mapping_test

@@ -8,19 +8,19 @@
 #include "tests/field/sparse_grids.h"
 #include "tests/field/volumes.h"
 
-namespace asperity {
+namespace asperity::implicit_surface_test {
 namespace {
 
 TEST(ImplicitSurface, AnswersWithTheDistanceOfWhatItWasMadeFrom) {
-  const auto grid = testing::sparse_box(0.0005, 0.003);
+  const auto grid = test::sparse_box(0.0005, 0.003);
   const ImplicitSurface surface =
       ImplicitSurface::build({grid, nullptr, nullptr, CellReconstruction::smooth, 0.0}).value();
   std::mt19937_64 generator(1);
   Hint hint;
   int asked = 0;
   for (int n = 0; n < 4000; ++n) {
-    const Vec3 p = testing::random_point(generator, 0.023);
-    const double exact = testing::box_distance(p, Vec3::Constant(0.02));
+    const Vec3 p = test::random_point(generator, 0.023);
+    const double exact = test::box_distance(p, Vec3::Constant(0.02));
     if (std::abs(exact) > 0.0015) continue;
     // Two voxels from edges a box's distance is what lies between its samples.
     const Vec3 q = p.cwiseAbs();
@@ -39,15 +39,15 @@ TEST(ImplicitSurface, AnswersWithTheDistanceOfWhatItWasMadeFrom) {
 }
 
 TEST(ImplicitSurface, TheFirstTouchOfAMotionIsExact) {
-  const auto grid = testing::sparse_ball(0.0006, 0.003);
+  const auto grid = test::sparse_ball(0.0006, 0.003);
   const ImplicitSurface surface =
       ImplicitSurface::build({grid, nullptr, nullptr, CellReconstruction::smooth, 0.0}).value();
   std::mt19937_64 generator(2);
   Hint hint;
   int hits = 0;
   for (int n = 0; n < 2000; ++n) {
-    const Segment motion{0.05 * testing::random_point(generator, 1.0).normalized(),
-                         testing::random_point(generator, 0.05)};
+    const Segment motion{0.05 * test::random_point(generator, 1.0).normalized(),
+                         test::random_point(generator, 0.05)};
     const Vec3 d = motion.to - motion.from;
     const double b = motion.from.dot(d);
     const double c = motion.from.squaredNorm() - 0.03 * 0.03;
@@ -67,7 +67,7 @@ TEST(ImplicitSurface, TheFirstTouchOfAMotionIsExact) {
 TEST(ImplicitSurface, FacesBeyondTheMeshAreRefused) {
   auto mesh =
       std::make_shared<const MeshSurface>(TriangleIndex::build(TriangleMesh::build(icosphere(1, 0.03)).value()));
-  SparseSource source = testing::sparse_ball(0.002, 0.006)->source();
+  SparseSource source = test::sparse_ball(0.002, 0.006)->source();
   for (SparseBlock& block : source.blocks) block.face.assign(SparseBlock::points, 3);
   auto good = std::make_shared<const SparseGrid>(SparseGrid::build(source).value());
   EXPECT_TRUE(ImplicitSurface::build({good, nullptr, mesh, CellReconstruction::smooth, 0.0}).ok());
@@ -79,7 +79,7 @@ TEST(ImplicitSurface, FacesBeyondTheMeshAreRefused) {
 }
 
 TEST(ImplicitSurface, APotentialWithoutASurfaceIsRefused) {
-  const auto empty = testing::sparse_grid([](const Vec3&) { return 0.001; }, testing::cube(0.01), 0.001, 0.004, 0.004);
+  const auto empty = test::sparse_grid([](const Vec3&) { return 0.001; }, test::cube(0.01), 0.001, 0.004, 0.004);
   const Result<ImplicitSurface> refused =
       ImplicitSurface::build({empty, nullptr, nullptr, CellReconstruction::smooth, 0.0});
   ASSERT_FALSE(refused);
@@ -88,4 +88,4 @@ TEST(ImplicitSurface, APotentialWithoutASurfaceIsRefused) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::implicit_surface_test

@@ -12,12 +12,12 @@
 #include "asperity/surface/iso_surface.h"
 #include "tests/field/sparse_grids.h"
 
-namespace asperity {
+namespace asperity::implicit_texture_test {
 namespace {
 
-using testing::ball_distance;
-using testing::box_distance;
-using testing::sparse_grid;
+using test::ball_distance;
+using test::box_distance;
+using test::sparse_grid;
 
 constexpr double voxel = 1e-3;
 constexpr double turn = 2.0 * std::numbers::pi;
@@ -33,7 +33,7 @@ std::shared_ptr<const SparseGrid> plane(double half, double band, double half_y 
 
 /// A ball of 16 mm.
 std::shared_ptr<const SparseGrid> ball() {
-  return sparse_grid([](const Vec3& p) { return ball_distance(p, 0.016); }, testing::cube(0.016), voxel, 4.0 * voxel,
+  return sparse_grid([](const Vec3& p) { return ball_distance(p, 0.016); }, test::cube(0.016), voxel, 4.0 * voxel,
                      4.0 * voxel);
 }
 
@@ -595,4 +595,4 @@ TEST(Textured, AnswersTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::implicit_texture_test

@@ -7,7 +7,7 @@
 #include "asperity/surface/iso_descent.h"
 #include "tests/field/volumes.h"
 
-namespace asperity::testing {
+namespace asperity::test::iso_surface_test {
 namespace {
 
 class IsoEach : public ::testing::TestWithParam<CellReconstruction> {};
@@ -240,4 +240,4 @@ TEST(IsoSurface, BallStopsAtItsRadius) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::iso_surface_test

@@ -4,7 +4,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::mesh_surface_test {
 namespace {
 
 using namespace test;
@@ -112,4 +112,4 @@ TEST(MeshSurface, answers_the_same_with_and_without_a_hint) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesh_surface_test

@@ -11,7 +11,7 @@
 
 #include "asperity/core/rng.h"
 
-namespace asperity::testing {
+namespace asperity::test::parametric_surface_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -496,4 +496,4 @@ TEST(ParametricSurface, NamesComeBack) {
 }
 
 }  // namespace
-}  // namespace asperity::testing
+}  // namespace asperity::test::parametric_surface_test

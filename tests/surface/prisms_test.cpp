@@ -4,7 +4,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::prisms_test {
 namespace {
 
 using namespace test;
@@ -103,4 +103,4 @@ TEST(Prisms, the_surface_of_a_prism_belongs_to_it) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::prisms_test

@@ -7,7 +7,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::relief_mesh_test {
 namespace {
 
 using namespace test;
@@ -179,4 +179,4 @@ TEST(TexelSubdivisions, make_triangles_of_a_texel_where_they_are_not_too_many) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_mesh_test

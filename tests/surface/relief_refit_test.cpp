@@ -6,7 +6,7 @@
 
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::relief_refit_test {
 namespace {
 
 using test::must;
@@ -53,7 +53,7 @@ TEST(ReliefRefit, NearestPointsAreThoseOfTheMovedReliefCutFinely) {
   for (const Mapping mapping : {Mapping::triplanar, Mapping::per_face}) {
     Fixture fixture(mapping, {}, 1);
     const ReliefSurface relief = fixture.moved_by(waved);
-    const test::Tessellation dense = test::tessellate(relief, 12);
+    const test::Tessellation dense = test::dense_net(relief, 12);
     Hint hint;
     for (int i = 0; i < 60; ++i) {
       const std::uint32_t face = test::random_face(rng, relief.base().mesh());
@@ -240,4 +240,4 @@ TEST(MovedSurface, SignedDistanceFollowsTheVertices) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_refit_test

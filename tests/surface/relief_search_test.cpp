@@ -8,7 +8,7 @@
 
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::relief_search_test {
 namespace {
 
 using namespace test;
@@ -29,7 +29,7 @@ const std::vector<Searched>& reliefs() {
       if (mapping == Mapping::per_face) maps = unlike_maps(amplitude);
       auto surface = relief_on(mesh_of(std::move(source)), std::move(maps),
                                CoatSettings{mapping, Vec2::Ones(), {folds, Blend::quintic, 0.15, {}}});
-      Tessellation dense = tessellate(*surface, cells);
+      Tessellation dense = dense_net(*surface, cells);
       made.push_back({std::move(name), std::move(surface), std::move(dense)});
     };
     add("sphere", icosphere(1, 0.02), 5e-4, Mapping::triplanar, FoldMode::keep, 60);
@@ -181,4 +181,4 @@ TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_search_test

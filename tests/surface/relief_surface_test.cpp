@@ -4,7 +4,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::relief_surface_test {
 namespace {
 
 using namespace test;
@@ -190,4 +190,4 @@ TEST(ReliefSurfaceTest, bounds_hold_the_relief) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_surface_test

@@ -68,7 +68,7 @@ struct Tessellation {
 };
 
 /// Every face cut into n x n triangles with their corners on the relief; neighbours share those on their edge.
-inline Tessellation tessellate(const ReliefSurface& surface, int n) {
+inline Tessellation dense_net(const ReliefSurface& surface, int n) {
   const TriangleMesh& base = surface.base().mesh();
   MeshSource source;
   std::map<std::array<std::uint32_t, 3>, std::uint32_t> shared;

@@ -10,7 +10,7 @@
 #include "tests/geometry/random_meshes.h"
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::shell_test {
 namespace {
 
 using namespace test;
@@ -411,4 +411,4 @@ RC_GTEST_PROP(T6_injectivity, neighbours_see_one_shell_over_their_common_edge, (
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::shell_test

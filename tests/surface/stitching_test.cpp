@@ -13,7 +13,7 @@
 
 #include "tests/surface/reliefs.h"
 
-namespace asperity {
+namespace asperity::stitching_test {
 namespace {
 
 using namespace test;
@@ -482,4 +482,4 @@ TEST(StitchingSettings, each_bad_value_is_named) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::stitching_test

@@ -87,7 +87,7 @@ void __cxa_throw(void* object, void* type, void (*destroy)(void*)) {  // NOLINT
 }
 }
 
-namespace asperity {
+namespace asperity::step_trap_test {
 namespace {
 
 struct Counts {
@@ -145,8 +145,8 @@ Scene scene_with(const Law& law, SearchStructure structure, double probe_radius)
 
 /// A sphere of 30 mm as an isosurface, the volume felt by every effect besides.
 Scene volume_scene(const Law& law, CellReconstruction reconstruction, double probe_radius, double threshold) {
-  static const auto smooth = testing::sphere_field(33);
-  static const auto trilinear = testing::sphere_field(33, CellReconstruction::trilinear);
+  static const auto smooth = test::sphere_field(33);
+  static const auto trilinear = test::sphere_field(33, CellReconstruction::trilinear);
   const auto& field = reconstruction == CellReconstruction::smooth ? smooth : trilinear;
   Instance instance;
   instance.name = "sphere";
@@ -170,7 +170,7 @@ Scene volume_scene(const Law& law, CellReconstruction reconstruction, double pro
 /// A ball of 30 mm as a potential with local materials.
 Scene potential_scene(const Law& law, CellReconstruction reconstruction, double probe_radius) {
   static const auto grid = [] {
-    SparseSource source = testing::sparse_ball(0.001, 0.006)->source();
+    SparseSource source = test::sparse_ball(0.001, 0.006)->source();
     for (std::size_t b = 0; b < source.blocks.size(); b += 2) {
       source.blocks[b].material.resize(SparseBlock::points);
       for (PointMaterial& m : source.blocks[b].material) m.stiffness = 700.0F;
@@ -431,4 +431,4 @@ INSTANTIATE_TEST_SUITE_P(EveryLaw, StepTrap, ::testing::ValuesIn(laws_of_meshes(
 });
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::step_trap_test

@@ -11,7 +11,7 @@
 #include "asperity/io/mesh_io.h"
 #include "tests/io/vdb/vdb_files.h"
 
-namespace asperity {
+namespace asperity::mesh_conversion_vdb_test {
 namespace {
 
 class MeshConversionVdb : public WithVdb {};
@@ -412,4 +412,4 @@ TEST_F(MeshConversionVdb, TheBunnyIsExact) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::mesh_conversion_vdb_test

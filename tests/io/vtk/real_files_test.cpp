@@ -9,7 +9,7 @@
 #include "asperity/field/derived_fields.h"
 #include "tests/io/vtk/vtk_files.h"
 
-namespace asperity {
+namespace asperity::real_files_test {
 namespace {
 
 class RealVolumes : public VtkFiles {
@@ -262,4 +262,4 @@ TEST_F(VtkFiles, NrrdVolumes) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::real_files_test

@@ -14,7 +14,7 @@
 
 #include "tests/io/vtk/vtk_files.h"
 
-namespace asperity {
+namespace asperity::written_files_test {
 namespace {
 
 /// How an XML file holds its data.
@@ -407,4 +407,4 @@ TEST_F(WrittenFiles, AStructuredGridThatIsTurnedHasToBeResampled) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::written_files_test
