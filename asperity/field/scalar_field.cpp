@@ -1,20 +1,16 @@
 #include "asperity/field/scalar_field.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <thread>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
 namespace {
 
 constexpr std::uint32_t leaf_cells = 4;
-
-std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 /// Least and greatest sample that the cells of each leaf need, for leaves of layers [first, last).
 template <class T>

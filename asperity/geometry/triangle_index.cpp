@@ -1,8 +1,9 @@
 #include "asperity/geometry/triangle_index.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
@@ -13,10 +14,6 @@ constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
-std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 void gather_from(const Bvh& bvh, const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) noexcept {
   bvh.gather(centre, reach, owner, patch);

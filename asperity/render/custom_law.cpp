@@ -3,20 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
+#include "asperity/core/identity.h"
 #include "asperity/core/suggest.h"
 #include "asperity/render/detail/iso_proxy.h"
 
 namespace asperity {
 
 namespace {
-
-std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 struct Registered {
   std::vector<std::string> names;

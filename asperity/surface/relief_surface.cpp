@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
@@ -59,11 +60,6 @@ bool hulls_apart(const ShellPrism& one, const std::array<Vec3, 6>& one_hull, con
       return true;
   }
   return false;
-}
-
-std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
 }
 
 Error overlap_error(const std::string& what) {
