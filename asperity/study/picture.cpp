@@ -36,10 +36,7 @@ Vec3 average_normal(const StrokePath& path) {
 }
 
 void add_corners(const Box& box, std::vector<Vec3>& points) {
-  for (int k = 0; k < 8; ++k) {
-    points.emplace_back((k & 1 ? box.upper : box.lower).x(), (k & 2 ? box.upper : box.lower).y(),
-                        (k & 4 ? box.upper : box.lower).z());
-  }
+  for (unsigned k = 0; k < 8; ++k) points.push_back(box.corner(k));
 }
 
 /// What there is to see: of a volume its isosurface alone.
@@ -47,10 +44,9 @@ Box visible_bounds(const Scene& scene) {
   Box all;
   for (std::size_t i = 0; i < scene.instances().size(); ++i) {
     const Instance& instance = scene.instances()[i];
-    std::vector<Vec3> corners;
     const IsoSurface* iso = iso_of(instance.surface);
-    add_corners(iso != nullptr ? iso->surface_bounds() : scene.world_bounds(i), corners);
-    for (const Vec3& corner : corners) all.include(iso != nullptr ? instance.world_from_object.apply(corner) : corner);
+    all.include(iso != nullptr ? transformed(iso->surface_bounds(), instance.world_from_object)
+                               : scene.world_bounds(i));
   }
   return all;
 }
