@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <utility>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 namespace {
@@ -84,30 +84,21 @@ class Slopes {
   std::array<std::size_t, 3> stride_;
 };
 
-/// `node_value(at)` for every node, layers shared among two threads where that pays.
+/// `node_value(at)` for every node, layers shared out over all cores where that pays.
 template <class NodeValue>
 std::vector<float> for_all_nodes(const GridAxes& axes, std::string_view what, const Progress& progress,
                                  const NodeValue& node_value) {
   const std::size_t layer = static_cast<std::size_t>(axes[0].size()) * axes[1].size();
   std::vector<float> out(layer * axes[2].size());
-  std::atomic<std::uint32_t> next{0};
-  const auto work = [&](bool report) {
-    for (std::uint32_t k = next.fetch_add(1); k < axes[2].size(); k = next.fetch_add(1)) {
-      if (report && progress) progress(what, static_cast<double>(k) / axes[2].size());
-      float* to = out.data() + layer * k;
-      for (std::uint32_t j = 0; j < axes[1].size(); ++j) {
-        for (std::uint32_t i = 0; i < axes[0].size(); ++i)
-          *to++ = static_cast<float>(node_value(std::array<std::uint32_t, 3>{i, j, k}));
-      }
+  const auto fill = [&](std::size_t k) {
+    float* to = out.data() + layer * k;
+    for (std::uint32_t j = 0; j < axes[1].size(); ++j) {
+      for (std::uint32_t i = 0; i < axes[0].size(); ++i)
+        *to++ = static_cast<float>(node_value(std::array<std::uint32_t, 3>{i, j, static_cast<std::uint32_t>(k)}));
     }
   };
-  if (out.size() >= parallel_nodes) {
-    std::thread helper(work, false);
-    work(true);
-    helper.join();
-  } else {
-    work(true);
-  }
+  parallel_for(axes[2].size(), {.threads = out.size() < parallel_nodes ? 1U : 0U, .progress = &progress, .what = what},
+               fill);
   return out;
 }
 

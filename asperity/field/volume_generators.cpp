@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <thread>
 #include <utility>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 namespace {
@@ -66,22 +66,13 @@ double shortest(const Vec3& extent) {
   return extent.minCoeff();
 }
 
-/// `layer(k)` for every layer of nodes along z, on two threads; the calling one reports.
+/// `layer(k)` for every layer of nodes along z, on all cores where that pays.
 template <class Layer>
 void for_all_layers(std::uint32_t layers, std::size_t nodes, std::string_view what, const Progress& progress,
                     const Layer& layer) {
-  std::atomic<std::uint32_t> next{0};
-  const auto work = [&](bool report) {
-    for (std::uint32_t k = next.fetch_add(1); k < layers; k = next.fetch_add(1)) {
-      if (report && progress) progress(what, static_cast<double>(k) / layers);
-      layer(k);
-    }
-  };
   constexpr std::size_t parallel_nodes = std::size_t{1} << 18U;
-  if (nodes < parallel_nodes) return work(true);
-  std::thread helper(work, false);
-  work(true);
-  helper.join();
+  parallel_for(layers, {.threads = nodes < parallel_nodes ? 1U : 0U, .progress = &progress, .what = what},
+               [&](std::size_t k) { layer(static_cast<std::uint32_t>(k)); });
 }
 
 /// The samples in the whole range of an integer type.

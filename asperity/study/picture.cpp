@@ -122,7 +122,7 @@ Status check(const PictureSettings& settings) {
   };
   if (settings.width < 16 || settings.width > 4096) return bad("width", "16 to 4096 pixels");
   if (settings.height < 16 || settings.height > 4096) return bad("height", "16 to 4096 pixels");
-  if (settings.threads < 1 || settings.threads > 64) return bad("threads", "1 to 64");
+  if (settings.threads < 0 || settings.threads > 64) return bad("threads", "0 (one a processor) to 64");
   if (!(settings.budget > 0.0) || !std::isfinite(settings.budget)) return bad("budget", "a time above 0 s");
   return success();
 }
@@ -159,11 +159,12 @@ Result<Picture> render_picture(const Scene& scene, const StrokePath& path, std::
   const Vec3 normal = average_normal(path);
   const std::vector<Vec3> framing = framing_points(scene, path);
   const Camera wanted = three_quarter_view(framing, normal, settings.width, settings.height);
-  const CastCost cost = measure_cost(scene, wanted, sparse, settings.threads);
+  const auto threads = static_cast<unsigned>(settings.threads);
+  const CastCost cost = measure_cost(scene, wanted, sparse, threads);
   const Detail detail = choose_detail(cost, wanted.width * wanted.height, settings.budget);
   const Camera camera = resized(wanted, detail.size);
-  const PixelGrid grid = cast_image(scene, camera, detail.block, settings.threads, progress);
-  const std::vector<EdgePixel> edges = cast_edges(scene, camera, grid, detail.edges, settings.threads);
+  const PixelGrid grid = cast_image(scene, camera, detail.block, threads, progress);
+  const std::vector<EdgePixel> edges = cast_edges(scene, camera, grid, detail.edges, threads);
 
   const Shaded shaded = shade(grid, edges, camera, normal);
   std::vector<Colour> colours = shaded.colours;
