@@ -1,5 +1,8 @@
 #include "asperity/core/result.h"
 
+#include <cstdio>
+#include <cstdlib>
+
 namespace asperity {
 
 const char* to_string(ErrorCode code) {
@@ -38,6 +41,16 @@ Error Error::at(const std::string& prefix) && {
     place = place.front() == '[' ? prefix + place : prefix + "." + place;
   }
   return std::move(*this);
+}
+
+void detail::wrong_side_of_result(const Error* error) noexcept {
+  if (error != nullptr) {
+    std::fprintf(stderr, "asperity: the value of a failed result was asked for: %s (%s)\n", error->message().c_str(),
+                 to_string(error->code));
+  } else {
+    std::fputs("asperity: the error of a result that went well was asked for\n", stderr);
+  }
+  std::abort();
 }
 
 }  // namespace asperity

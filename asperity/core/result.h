@@ -1,6 +1,7 @@
 #pragma once
 // Loading and authoring answer a Result: the value, or an Error with a named cause, the file and the place in it.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -48,7 +49,18 @@ struct Error {
   [[nodiscard]] Error at(const std::string& prefix) &&;
 };
 
-/// Value or Error. `[[nodiscard]]`: an ignored result is a defect.
+namespace detail {
+/// Says on standard error what was asked for in vain, and aborts: `error` is what is there in place of the value,
+/// nullptr where there is a value in place of the error. [any]
+#if defined(__GNUC__)
+[[gnu::cold]]
+#endif
+[[noreturn]] void
+wrong_side_of_result(const Error* error) noexcept;
+}  // namespace detail
+
+/// Value or Error. `[[nodiscard]]`: an ignored result is a defect. Asking an error for its value, or a value for its
+/// error, ends the program with the error's words on standard error, in every build: ask ok() first.
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -58,20 +70,28 @@ class [[nodiscard]] Result {
   [[nodiscard]] bool ok() const { return content_.index() == 0; }
   explicit operator bool() const { return ok(); }
 
-  [[nodiscard]] T& value() & { return *std::get_if<0>(&content_); }
-  [[nodiscard]] const T& value() const& { return *std::get_if<0>(&content_); }
-  [[nodiscard]] T&& value() && { return std::move(*std::get_if<0>(&content_)); }
+  [[nodiscard]] T& value() & { return *checked<0>(content_); }
+  [[nodiscard]] const T& value() const& { return *checked<0>(content_); }
+  [[nodiscard]] T&& value() && { return std::move(*checked<0>(content_)); }
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
   T&& operator*() && { return std::move(*this).value(); }
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
 
-  [[nodiscard]] Error& error() & { return *std::get_if<1>(&content_); }
-  [[nodiscard]] const Error& error() const& { return *std::get_if<1>(&content_); }
-  [[nodiscard]] Error&& error() && { return std::move(*std::get_if<1>(&content_)); }
+  [[nodiscard]] Error& error() & { return *checked<1>(content_); }
+  [[nodiscard]] const Error& error() const& { return *checked<1>(content_); }
+  [[nodiscard]] Error&& error() && { return std::move(*checked<1>(content_)); }
 
  private:
+  template <std::size_t Side, class Content>
+  static auto* checked(Content& content) {
+    auto* there = std::get_if<Side>(&content);
+    if (there == nullptr) [[unlikely]]
+      detail::wrong_side_of_result(std::get_if<1>(&content));
+    return there;
+  }
+
   std::variant<T, Error> content_;
 };
 
