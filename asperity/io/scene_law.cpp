@@ -215,19 +215,17 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   ASPERITY_CHECK(reader.status());
   Result<Law> law = law_by_name(type);
   if (!law) return std::move(law).error().at(place + ".type");
-  const auto formulation = [&](Formulation fallback) {
-    return static_cast<Formulation>(
-        reader.choice("formulation", formulation_names(), static_cast<std::size_t>(fallback)));
-  };
+  // Told by "formulation" or by a name that ends in "-literal", a form has the same options by default.
+  if (const std::optional<Formulation> named = formulation_of(*law)) {
+    const auto form = reader.choice("formulation", formulation_names(), static_cast<std::size_t>(*named));
+    *law = in_formulation(*law, static_cast<Formulation>(form));
+  }
   if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
-    meso->formulation = formulation(meso->formulation);
     ASPERITY_CHECK(read_mesostructure(reader, context, *meso));
-  } else if (auto* shading = std::get_if<ForceShadingLaw>(&*law)) {
+  } else if (std::holds_alternative<ForceShadingLaw>(*law)) {
     only(reader, {"formulation"}, "by force shading");
-    shading->formulation = formulation(shading->formulation);
   } else if (auto* height_field = std::get_if<HeightFieldLaw>(&*law)) {
     only(reader, {"formulation", "edge_taper"}, "by a height-field law");
-    height_field->formulation = formulation(height_field->formulation);
     height_field->edge_taper = reader.number("edge_taper", height_field->edge_taper, Range{0.0, 1.0 / 3.0});
   } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&*law)) {
     read_generated(reader, *generated);
@@ -235,20 +233,16 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     read_dense(reader, *dense);
   } else if (auto* avila = std::get_if<AvilaLaw>(&*law)) {
     only(reader, {"formulation", "band", "largest_force", "retarding"}, "by the law \"avila\"");
-    avila->formulation = formulation(avila->formulation);
     avila->band = reader.number("band", avila->band, Range::not_negative());
     avila->largest_force = reader.quantity("largest_force", Dimension::force, avila->largest_force, Range::positive());
     avila->retarding = reader.quantity("retarding", Dimension::damping, avila->retarding, Range::not_negative());
   } else if (auto* contact = std::get_if<VirtualContactPointLaw>(&*law)) {
-    contact->formulation = formulation(contact->formulation);
     read_virtual_contact_point(reader, *contact);
   } else if (auto* magnetic = std::get_if<MagneticLaw>(&*law)) {
     only(reader, {"formulation", "band"}, "by the law \"magnetic\"");
-    magnetic->formulation = formulation(magnetic->formulation);
     magnetic->band = reader.quantity("band", Dimension::length, magnetic->band, Range::positive());
   } else if (auto* cross = std::get_if<CrossUncrossLaw>(&*law)) {
     only(reader, {"formulation", "retarding", "reach"}, "by the law \"cross-uncross\"");
-    cross->formulation = formulation(cross->formulation);
     cross->retarding = reader.quantity("retarding", Dimension::damping, cross->retarding, Range::not_negative());
     if (cross->formulation == Formulation::consistent)
       reader.refuse({"reach"}, "by the consistent law \"cross-uncross\", which looks as far as it has to");
