@@ -94,10 +94,13 @@ ReliefSurface::ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest)
   fit(ShellDirections::least_squares);
 }
 
-ReliefSurface::ReliefSurface(MeshSurface base, Coat coat) : ReliefSurface(base, std::move(coat), base) {}
+// Braces: the check comes before the coat is moved.
+ReliefSurface::ReliefSurface(MeshSurface base, Coat coat)
+    : ReliefSurface{(static_cast<void>(coat.check_fits(base.mesh()).value()), base), std::move(coat), base} {}
 
 Result<ReliefSurface> ReliefSurface::build(MeshSurface base, Coat coat, const ReliefSettings& settings) {
-  ReliefSurface relief(std::move(base), std::move(coat));
+  ASPERITY_CHECK(coat.check_fits(base.mesh()));
+  ReliefSurface relief(base, std::move(coat), base);
   ASPERITY_CHECK(relief.settle(settings));
   return relief;
 }
