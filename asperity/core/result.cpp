@@ -5,26 +5,6 @@
 
 namespace asperity {
 
-const char* to_string(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::file_missing: return "file_missing";
-    case ErrorCode::file_empty: return "file_empty";
-    case ErrorCode::file_truncated: return "file_truncated";
-    case ErrorCode::file_malformed: return "file_malformed";
-    case ErrorCode::file_unsupported: return "file_unsupported";
-    case ErrorCode::file_unwritable: return "file_unwritable";
-    case ErrorCode::bad_key: return "bad_key";
-    case ErrorCode::bad_type: return "bad_type";
-    case ErrorCode::bad_value: return "bad_value";
-    case ErrorCode::bad_mesh: return "bad_mesh";
-    case ErrorCode::bad_map: return "bad_map";
-    case ErrorCode::unsupported_pair: return "unsupported_pair";
-    case ErrorCode::too_large: return "too_large";
-    case ErrorCode::mismatch: return "mismatch";
-  }
-  return "unknown";
-}
-
 std::string Error::message() const {
   std::string text;
   if (!file.empty()) text += file + ": ";

@@ -7,6 +7,10 @@
 #include <utility>
 #include <variant>
 
+#include "asperity/core/names.h"
+
+#include "asperity/core/names.h"
+
 namespace asperity {
 
 /// Named cause of a failure.
@@ -26,9 +30,24 @@ enum class ErrorCode {
   too_large,         ///< would exceed a stated memory or size bound
   mismatch,          ///< two inputs do not belong together (trace and scene, map sizes)
 };
-
-/// Stable name of the cause, used in messages and `--json` ("bad_value"). [any]
-const char* to_string(ErrorCode code);
+/// As in messages and `--json`.
+template <>
+struct Names<ErrorCode> {
+  static constexpr auto table = std::to_array<Named<ErrorCode>>({{ErrorCode::file_missing, "file_missing"},
+                                                                 {ErrorCode::file_empty, "file_empty"},
+                                                                 {ErrorCode::file_truncated, "file_truncated"},
+                                                                 {ErrorCode::file_malformed, "file_malformed"},
+                                                                 {ErrorCode::file_unsupported, "file_unsupported"},
+                                                                 {ErrorCode::file_unwritable, "file_unwritable"},
+                                                                 {ErrorCode::bad_key, "bad_key"},
+                                                                 {ErrorCode::bad_type, "bad_type"},
+                                                                 {ErrorCode::bad_value, "bad_value"},
+                                                                 {ErrorCode::bad_mesh, "bad_mesh"},
+                                                                 {ErrorCode::bad_map, "bad_map"},
+                                                                 {ErrorCode::unsupported_pair, "unsupported_pair"},
+                                                                 {ErrorCode::too_large, "too_large"},
+                                                                 {ErrorCode::mismatch, "mismatch"}});
+};
 
 /// What went wrong, where, and what would have been accepted.
 struct Error {

@@ -16,36 +16,10 @@ namespace {
 /// Below this many nodes a second thread costs more than it brings.
 constexpr std::size_t parallel_nodes = std::size_t{1} << 18U;
 
-constexpr std::array<std::pair<DerivedField, const char*>, 4> field_names{{
-    {DerivedField::vorticity_magnitude, "vorticity_magnitude"},
-    {DerivedField::q_criterion, "q_criterion"},
-    {DerivedField::helicity, "helicity"},
-    {DerivedField::gradient_magnitude, "gradient_magnitude"},
-}};
-constexpr std::array<std::pair<VectorPart, const char*>, 4> part_names{{
-    {VectorPart::magnitude, "magnitude"},
-    {VectorPart::x, "x"},
-    {VectorPart::y, "y"},
-    {VectorPart::z, "z"},
-}};
-
-template <class Names>
-auto parse_name(const Names& names, std::string_view name, const char* what)
-    -> Result<typename Names::value_type::first_type> {
-  std::string accepted;
-  for (const auto& [value, known] : names) {
-    if (name == known) return value;
-    accepted += accepted.empty() ? known : fmt::format(", {}", known);
-  }
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no {}", name, what), "", "", accepted};
-}
-
-template <class Names, class Value>
-const char* name_of(const Names& names, Value value) {
-  for (const auto& [known, name] : names) {
-    if (known == value) return name;
-  }
-  return "unknown";
+template <HasNames E>
+Result<E> parse_name(std::string_view name, const char* what) {
+  if (const std::optional<E> value = value_named<E>(name)) return *value;
+  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no {}", name, what), "", "", name_list<E>()};
 }
 
 using AxisStencils = std::vector<DerivativeStencil>;
@@ -145,20 +119,12 @@ std::string derived_name(const std::string& of, const char* what) {
 
 }  // namespace
 
-const char* to_string(DerivedField field) {
-  return name_of(field_names, field);
-}
-
 Result<DerivedField> parse_derived_field(std::string_view name) {
-  return parse_name(field_names, name, "derived field");
-}
-
-const char* to_string(VectorPart part) {
-  return name_of(part_names, part);
+  return parse_name<DerivedField>(name, "derived field");
 }
 
 Result<VectorPart> parse_vector_part(std::string_view name) {
-  return parse_name(part_names, name, "part of a vector");
+  return parse_name<VectorPart>(name, "part of a vector");
 }
 
 DerivativeStencil derivative_stencil(const GridAxis& axis, std::uint32_t node) noexcept {

@@ -19,16 +19,15 @@ constexpr std::uint32_t most_nodes = 4096;
 
 struct Kind {
   VolumeKind kind;
-  const char* name;
   std::array<std::string_view, 5> parameters;  // as many as are not empty
 };
 constexpr std::array<Kind, 6> kinds{{
-    {VolumeKind::cavity, "cavity", {"speed", "strength", "thickness", "wavelength", "time"}},
-    {VolumeKind::sphere, "sphere", {"radius"}},
-    {VolumeKind::shells, "shells", {"count", "thickness", "wavelength"}},
-    {VolumeKind::ramp, "ramp", {"gradient", "amplitude"}},
-    {VolumeKind::waves, "waves", {"amplitude", "wavelength"}},
-    {VolumeKind::gyroid, "gyroid", {"wavelength"}},
+    {VolumeKind::cavity, {"speed", "strength", "thickness", "wavelength", "time"}},
+    {VolumeKind::sphere, {"radius"}},
+    {VolumeKind::shells, {"count", "thickness", "wavelength"}},
+    {VolumeKind::ramp, {"gradient", "amplitude"}},
+    {VolumeKind::waves, {"amplitude", "wavelength"}},
+    {VolumeKind::gyroid, {"wavelength"}},
 }};
 
 Status above_zero(double value, const char* place, const char* unit) {
@@ -148,20 +147,10 @@ std::span<const std::string_view> parameters_of(VolumeKind kind) {
   return {};
 }
 
-const char* to_string(VolumeKind kind) {
-  for (const Kind& entry : kinds) {
-    if (entry.kind == kind) return entry.name;
-  }
-  return "unknown";
-}
-
 Result<VolumeKind> parse_volume_kind(std::string_view name) {
-  std::string accepted;
-  for (const Kind& entry : kinds) {
-    if (name == entry.name) return entry.kind;
-    accepted += accepted.empty() ? entry.name : fmt::format(", {}", entry.name);
-  }
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in volume", name), "", "", accepted};
+  if (const std::optional<VolumeKind> kind = value_named<VolumeKind>(name)) return *kind;
+  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in volume", name), "", "",
+               name_list<VolumeKind>()};
 }
 
 VolumeGenerator completed(VolumeGenerator g) {

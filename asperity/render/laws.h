@@ -114,6 +114,12 @@ enum class ContactMagnitude {
   distance,   ///< to the virtual contact point (hybrid-surface-2004)
   potential,  ///< what the potential says (Avila and Sobierajski 1996): softer where edges are interpolated
 };
+/// As in scene files.
+template <>
+struct Names<ContactMagnitude> {
+  static constexpr auto table = std::to_array<Named<ContactMagnitude>>(
+      {{ContactMagnitude::distance, "distance"}, {ContactMagnitude::potential, "potential"}});
+};
 
 /// Virtual contact point of an implicit surface: the probe is held by a spring and a damper to the surface's point
 /// along the potential's gradient (hybrid-surface-2004, eq. 1), which friction retards (eq. 2; f_c is the material's

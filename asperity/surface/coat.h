@@ -21,6 +21,12 @@ namespace asperity {
 ///              axis a weighs max(0, n_a^2 - |n|^2 / 5)^2, so that within about 27 degrees of an axis it is alone.
 ///              Continuous over every edge, no UVs needed
 enum class Mapping { per_face, uv, triplanar };
+/// As in scene files.
+template <>
+struct Names<Mapping> {
+  static constexpr auto table = std::to_array<Named<Mapping>>(
+      {{Mapping::uv, "uv"}, {Mapping::per_face, "per_face"}, {Mapping::triplanar, "triplanar"}});
+};
 
 /// How a mesostructure lies on a mesh.
 struct CoatSettings {

@@ -610,20 +610,9 @@ PointHeight coat_height(const Coat& coat, const TriangleMesh& mesh) {
   };
 }
 
-const char* to_string(Redistancing mode) {
-  switch (mode) {
-    case Redistancing::none: return "none";
-    case Redistancing::normalised: return "normalised";
-    case Redistancing::redistanced: break;
-  }
-  return "redistanced";
-}
-
 Result<Redistancing> parse_redistancing(std::string_view name) {
-  for (const Redistancing mode : {Redistancing::none, Redistancing::normalised, Redistancing::redistanced}) {
-    if (name == to_string(mode)) return mode;
-  }
-  return Error{ErrorCode::bad_value, fmt::format("is \"{}\"", name), {}, {}, "none, normalised or redistanced"};
+  if (const std::optional<Redistancing> mode = value_named<Redistancing>(name)) return *mode;
+  return Error{ErrorCode::bad_value, fmt::format("is \"{}\"", name), {}, {}, name_list<Redistancing>("", " or ")};
 }
 
 Result<TexturedPotential> textured(const SparseGrid& grid, const PointHeight& height, Redistancing mode,

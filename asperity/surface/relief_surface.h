@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/surface/coat.h"
 #include "asperity/surface/mesh_surface.h"
 #include "asperity/surface/prisms.h"
@@ -14,6 +15,12 @@ namespace asperity {
 enum class OnOverlap {
   cure,    ///< turn the directions where that helps, then lower the relief around the vertices at fault, and report it
   refuse,  ///< Error naming the faces and vertices
+};
+/// As in scene files.
+template <>
+struct Names<OnOverlap> {
+  static constexpr auto table =
+      std::to_array<Named<OnOverlap>>({{OnOverlap::cure, "cure"}, {OnOverlap::refuse, "refuse"}});
 };
 
 /// How a relief is made from a base and a coat.
