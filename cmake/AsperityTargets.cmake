@@ -10,12 +10,42 @@ if(ASPERITY_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   endif()
 endif()
 
+# What a tick runs through is built with -O3; all else is built to be built quickly. The modules that are hot:
+set(ASPERITY_HOT_MODULES core geometry field material surface render device servo)
+
+# The sources of a target are compiled in a few large units, since most of what a source costs are its headers: in
+# as many as keep two cores busy. OFF: each by itself, for editors and clang-tidy.
+option(ASPERITY_UNITY "Compile the sources of a target in a few large units" ON)
+function(asperity_units target units)
+  if(NOT ASPERITY_UNITY)
+    return()
+  endif()
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "\\.cpp$")
+  list(LENGTH sources count)
+  math(EXPR batch "(${count} + ${units} - 1) / ${units}")
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE ${batch})
+endfunction()
+
+# asperity_cold(TARGET): nothing in it is run thousands of times a second.
+function(asperity_cold target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 add_library(asperity_build_settings INTERFACE)
 if(PROJECT_IS_TOP_LEVEL)
   target_compile_options(asperity_build_settings INTERFACE
-    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast -Wnon-virtual-dtor -Woverloaded-virtual -Werror
+    -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wold-style-cast -Wnon-virtual-dtor -Woverloaded-virtual -Werror
     # GCC 12 reports false positives here inside Eigen and std::variant at -O2.
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+  # Files that share a unit see one another's names: a local variable may be called as another file's function, and what
+  # is in an anonymous namespace is no header's.
+  if(ASPERITY_UNITY)
+    target_compile_options(asperity_build_settings INTERFACE
+      $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local -Wno-subobject-linkage>)
+  else()
+    target_compile_options(asperity_build_settings INTERFACE -Wshadow)
+  endif()
 endif()
 if(ASPERITY_SANITIZE)
   target_compile_options(asperity_build_settings INTERFACE -fsanitize=${ASPERITY_SANITIZE} -fno-omit-frame-pointer)
@@ -23,11 +53,11 @@ if(ASPERITY_SANITIZE)
   target_compile_definitions(asperity_build_settings INTERFACE ASPERITY_SANITIZED)
 endif()
 
-# asperity_module(NAME DEPENDS modules... LIBRARIES public... PRIVATE private...)
+# asperity_module(NAME UNITS n DEPENDS modules... LIBRARIES public... PRIVATE private...)
 # A library from every .cpp in the current folder and in its detail/, with the alias asperity::NAME. Headers in detail/
 # are the module's own: no other module includes them, and they are not installed.
 function(asperity_module name)
-  cmake_parse_arguments(arg "" "" "DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "" "UNITS" "DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp" "${CMAKE_CURRENT_SOURCE_DIR}/detail/*.cpp")
   add_library(asperity_${name} STATIC ${sources})
   add_library(asperity::${name} ALIAS asperity_${name})
@@ -40,6 +70,10 @@ function(asperity_module name)
   endforeach()
   target_link_libraries(asperity_${name} PUBLIC ${arg_LIBRARIES})
   target_link_libraries(asperity_${name} PRIVATE $<BUILD_INTERFACE:asperity_build_settings> ${arg_PRIVATE})
+  asperity_units(asperity_${name} ${arg_UNITS})
+  if(NOT name IN_LIST ASPERITY_HOT_MODULES)
+    asperity_cold(asperity_${name})
+  endif()
   if(NOT name STREQUAL "core")
     target_precompile_headers(asperity_${name} REUSE_FROM asperity_core)
   endif()
@@ -49,9 +83,9 @@ function(asperity_module name)
   endif()
 endfunction()
 
-# asperity_test(NAME LIBRARIES ...): one test program from every .cpp in the current folder.
+# asperity_test(NAME UNITS n LIBRARIES ...): one test program from every .cpp in the current folder.
 function(asperity_test name)
-  cmake_parse_arguments(arg "" "" "LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "" "UNITS" "LIBRARIES" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
   add_executable(asperity_${name}_tests ${sources})
   target_include_directories(asperity_${name}_tests PRIVATE "${PROJECT_SOURCE_DIR}")

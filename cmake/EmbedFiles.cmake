@@ -37,5 +37,6 @@ function(asperity_embed_files target symbol)
   add_custom_command(OUTPUT "${output}"
     COMMAND "${CMAKE_COMMAND}" "-DOUTPUT=${output}" "-DSYMBOL=${symbol}" "-DFILES=${joined}" -P "${ASPERITY_EMBED_SCRIPT}"
     DEPENDS ${files} "${ASPERITY_EMBED_SCRIPT}" VERBATIM COMMENT "Embedding ${symbol}")
+  set_source_files_properties("${output}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   target_sources(${target} PRIVATE "${output}")
 endfunction()

@@ -132,27 +132,23 @@ Result<int> bench(const BenchOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_bench(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("bench", "Measure how long one tick takes on a scene, warm and cold");
+void add_bench(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("bench", "Measure how long one tick takes on a scene, warm and cold");
   auto options = std::make_shared<BenchOptions>();
-  add_scene_options(*command, options->scene);
-  command->add_option("--law", options->scene.law, "Of every surface")->group("Touch");
-  command->add_option("--ticks", options->ticks, "Warm ticks to measure")
-      ->check(CLI::Range(1, 100000000))
-      ->capture_default_str();
-  command
-      ->add_option("--cold-ticks", options->cold_ticks, "Ticks measured after 64 MB have been swept through the caches")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  add_console_options(*command, console);
-  command->footer(
+  add_scene_options(command, options->scene);
+  command.option("--law", options->scene.law, "Of every surface").group("Touch");
+  command.option("--ticks", options->ticks, "Warm ticks to measure").between(1, 100000000).shows_default();
+  command.option("--cold-ticks", options->cold_ticks, "Ticks measured after 64 MB have been swept through the caches")
+      .between(1, 1000000)
+      .shows_default();
+  add_console_options(command, console);
+  command.closing_words(
       "The ticks are those of the scene's own stroke. Times include one reading of the clock (some 20 ns).\n"
       "Examples:\n"
       "  asperity bench icosphere\n"
       "  asperity bench bunny.obj --law god-object --ticks 1000000 --json");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return bench(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

@@ -1,11 +1,11 @@
 #pragma once
 // What the commands of the program share. Each command has one file: add_NAME declares its options and says what to do.
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "apps/asperity/arguments.h"
 #include "asperity/core/progress.h"
 #include "asperity/core/result.h"
 
@@ -38,19 +38,19 @@ using Action = std::function<Result<int>()>;
 /// "asperity 0.1.0"
 std::string program_name();
 
-CLI::App* add_touch(CLI::App& app, Console& console, Action& action);
-CLI::App* add_compare(CLI::App& app, Console& console, Action& action);
-CLI::App* add_replay(CLI::App& app, Console& console, Action& action);
-CLI::App* add_inspect(CLI::App& app, Console& console, Action& action);
-CLI::App* add_convert(CLI::App& app, Console& console, Action& action);
-CLI::App* add_fit_friction(CLI::App& app, Console& console, Action& action);
-CLI::App* add_score(CLI::App& app, Console& console, Action& action);
-CLI::App* add_library(CLI::App& app, Console& console, Action& action);
-CLI::App* add_scenes(CLI::App& app, Console& console, Action& action);
-CLI::App* add_bench(CLI::App& app, Console& console, Action& action);
-CLI::App* add_schema(CLI::App& app, Console& console, Action& action);
+void add_touch(Arguments& program, Console& console, Action& action);
+void add_compare(Arguments& program, Console& console, Action& action);
+void add_replay(Arguments& program, Console& console, Action& action);
+void add_inspect(Arguments& program, Console& console, Action& action);
+void add_convert(Arguments& program, Console& console, Action& action);
+void add_fit_friction(Arguments& program, Console& console, Action& action);
+void add_score(Arguments& program, Console& console, Action& action);
+void add_library(Arguments& program, Console& console, Action& action);
+void add_scenes(Arguments& program, Console& console, Action& action);
+void add_bench(Arguments& program, Console& console, Action& action);
+void add_schema(Arguments& program, Console& console, Action& action);
 
 /// Adds --json and --progress, which every command takes.
-void add_console_options(CLI::App& command, Console& console, bool with_json = true);
+void add_console_options(Arguments& command, Console& console, bool with_json = true);
 
 }  // namespace asperity::program

@@ -295,22 +295,22 @@ std::string words_of_friction() {
 
 }  // namespace
 
-CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("compare", "Put several laws side by side on one scene and stroke");
+void add_compare(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("compare", "Put several laws side by side on one scene and stroke");
   auto options = std::make_shared<CompareOptions>();
-  add_scene_options(*command, options->scene);
+  add_scene_options(command, options->scene);
   command
-      ->add_option("--laws", options->laws,
-                   "Laws, separated by commas; default: those that suit the scene. mesh/LAW, relief/LAW, implicit/LAW: "
-                   "meshes felt through that representation. LAW+FRICTION, LAW+texture-literal, ...: see below")
-      ->delimiter(',');
-  command->add_flag("--one-way", options->one_way,
-                    "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
-                    "energy a loop can be told");
-  command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE-compare");
-  command->add_flag("--no-report", options->no_report, "Numbers only: no picture, no page");
-  add_console_options(*command, console);
-  command->footer(
+      .option("--laws", options->laws,
+              "Laws, separated by commas; default: those that suit the scene. mesh/LAW, relief/LAW, implicit/LAW: "
+              "meshes felt through that representation. LAW+FRICTION, LAW+texture-literal, ...: see below")
+      .delimiter(',');
+  command.flag("--one-way", options->one_way,
+               "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
+               "energy a loop can be told");
+  command.option("--out", options->out, "Folder of the outputs; default out/SCENE-compare");
+  command.flag("--no-report", options->no_report, "Numbers only: no picture, no page");
+  add_console_options(command, console);
+  command.closing_words(
       "direction: mean angle between the force and the relief's normal. height: RMS of followed height against the "
       "true relief, of what was\n"
       "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "
@@ -327,9 +327,8 @@ CLI::App* add_compare(CLI::App& app, Console& console, Action& action) {
       "  asperity compare bunny.obj --implicit --laws mesh/proxy,proxy,virtual-contact-point\n"
       "  asperity compare groove --laws mesostructure-literal,mesostructure\n"
       "  asperity compare bunny.obj --relief rock.png --height 1mm --json");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return compare(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

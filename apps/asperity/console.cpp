@@ -67,9 +67,9 @@ std::string program_name() {
   return "asperity " ASPERITY_VERSION;
 }
 
-void add_console_options(CLI::App& command, Console& console, bool with_json) {
-  if (with_json) command.add_flag("--json", console.json, "Answer on standard output as JSON, for programs");
-  command.add_flag("--progress", console.show_progress, "Show progress on standard error even when it is no terminal");
+void add_console_options(Arguments& command, Console& console, bool with_json) {
+  if (with_json) command.flag("--json", console.json, "Answer on standard output as JSON, for programs");
+  command.flag("--progress", console.show_progress, "Show progress on standard error even when it is no terminal");
 }
 
 }  // namespace asperity::program

@@ -242,44 +242,39 @@ Result<int> convert(const ConvertOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("convert",
-                         "Write a volume as a bricked file (.aspvol), which is touched without being held in "
-                         "memory; a mesh as a level set (.vdb); or a mesh or a scene as glTF (.glb, .gltf)");
+void add_convert(Arguments& program, Console& console, Action& action) {
+  Arguments command =
+      program.command("convert",
+                      "Write a volume as a bricked file (.aspvol), which is touched without being held in "
+                      "memory; a mesh as a level set (.vdb); or a mesh or a scene as glTF (.glb, .gltf)");
   auto options = std::make_shared<ConvertOptions>();
   command
-      ->add_option(
+      .option(
           "FILES", options->files,
           "The volume (.vtk, .vti, .vtr, .nrrd, .json sidecar, ...) and the .aspvol file to write; with "
           "--generator only the latter. Or a mesh and the .vdb file to write; or a mesh or scene and the .glb or .gltf")
-      ->required()
-      ->expected(1, 2);
-  command->add_option("--array", options->array, "Which array of the volume");
-  command->add_option("--component", options->component, "Of vectors: magnitude, x, y or z");
-  command->add_option("--derive", options->derive,
-                      "Of a velocity: vorticity_magnitude, q_criterion, helicity; of any array: gradient_magnitude");
-  command->add_option("--time", options->time, "Of an OpenFOAM case: which step");
-  command->add_option("--units", options->units, "The file's unit of length: mm, cm, ... (m)");
-  command->add_option("--fit", options->fit, "Scale so that the largest side is this long: 20cm");
-  command->add_option("--generator", options->generator,
-                      "A built-in volume: sphere, shells, ramp, waves, gyroid, cavity");
-  command->add_option("--size", options->size,
-                      "Of a built-in volume: nodes along all axes, or along each: 1024, 259x127x128");
+      .required()
+      .expected(1, 2);
+  command.option("--array", options->array, "Which array of the volume");
+  command.option("--component", options->component, "Of vectors: magnitude, x, y or z");
+  command.option("--derive", options->derive,
+                 "Of a velocity: vorticity_magnitude, q_criterion, helicity; of any array: gradient_magnitude");
+  command.option("--time", options->time, "Of an OpenFOAM case: which step");
+  command.option("--units", options->units, "The file's unit of length: mm, cm, ... (m)");
+  command.option("--fit", options->fit, "Scale so that the largest side is this long: 20cm");
+  command.option("--generator", options->generator, "A built-in volume: sphere, shells, ramp, waves, gyroid, cavity");
+  command.option("--size", options->size,
+                 "Of a built-in volume: nodes along all axes, or along each: 1024, 259x127x128");
   MeshConversion& mesh = options->mesh;
-  command->add_option("--resolution", mesh.resolution, "Of a mesh: voxels along its longest side (256)")->group("Mesh");
-  command->add_option("--voxel", mesh.voxel, "Of a mesh: the voxel, in its file's unit")->group("Mesh");
-  command->add_option("--budget", mesh.budget, "Of a mesh: the finest voxel that takes at most this: 64MB")
-      ->group("Mesh");
-  command->add_option("--band-outside", mesh.band_outside, "How far out distances are stored (3 voxels)")
-      ->group("Mesh");
-  command->add_option("--band-inside", mesh.band_inside, "How far in, or all (a tenth of the longest side)")
-      ->group("Mesh");
-  command->add_option("--inside", mesh.inside, "What is inside: automatic, flood, winding, shell")->group("Mesh");
-  command->add_option("--shell-thickness", mesh.shell_thickness, "Of the shell around open sheets (2 voxels)")
-      ->group("Mesh");
-  add_console_options(*command, console);
-  command->footer(
+  command.option("--resolution", mesh.resolution, "Of a mesh: voxels along its longest side (256)").group("Mesh");
+  command.option("--voxel", mesh.voxel, "Of a mesh: the voxel, in its file's unit").group("Mesh");
+  command.option("--budget", mesh.budget, "Of a mesh: the finest voxel that takes at most this: 64MB").group("Mesh");
+  command.option("--band-outside", mesh.band_outside, "How far out distances are stored (3 voxels)").group("Mesh");
+  command.option("--band-inside", mesh.band_inside, "How far in, or all (a tenth of the longest side)").group("Mesh");
+  command.option("--inside", mesh.inside, "What is inside: automatic, flood, winding, shell").group("Mesh");
+  command.option("--shell-thickness", mesh.shell_thickness, "Of the shell around open sheets (2 voxels)").group("Mesh");
+  add_console_options(command, console);
+  command.closing_words(
       "Volumes are read whole into memory; built-in ones are written slab by slab, whatever their size.\n"
       "Examples:\n"
       "  asperity convert flow.vtr vortices.aspvol --array velocity --derive q_criterion --units mm\n"
@@ -287,9 +282,8 @@ CLI::App* add_convert(CLI::App& app, Console& console, Action& action) {
       "  asperity convert bunny.obj bunny.vdb --resolution 512\n"
       "  asperity convert scene.json relief.glb\n"
       "  asperity convert --generator sphere --size 1024 sphere.aspvol");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return convert(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

@@ -11,7 +11,7 @@ namespace asperity::program {
 namespace {
 
 /// Force with which the stroke presses on the plain surface (N).
-double pressing_force(const Experiment& experiment, double stiffness) {
+double stroke_force(const Experiment& experiment, double stiffness) {
   const StrokeSettings& stroke = experiment.stroke;
   return stroke.press == PressMode::force ? stroke.normal_force : stiffness * std::max(0.0, stroke.depth);
 }
@@ -91,7 +91,7 @@ std::vector<std::string> feel_of(const Experiment& experiment, const Instance& i
   } else {
     lines.push_back(fmt::format("{:g} N/m is within the {:g} N/m of {}", stiffness, device.max_stiffness, device.name));
   }
-  const double force = pressing_force(experiment, stiffness);
+  const double force = stroke_force(experiment, stiffness);
   if (force > device.max_force) {
     lines.push_back(fmt::format("the stroke presses with {:.3g} N, more than the {:g} N of {}: the force is cut", force,
                                 device.max_force, device.name));

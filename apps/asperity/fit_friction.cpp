@@ -314,37 +314,37 @@ Result<int> fit(const FitFrictionOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_fit_friction(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("fit-friction", "Fit friction laws to measured stick-slip, and predict what was not fitted");
+void add_fit_friction(Arguments& program, Console& console, Action& action) {
+  Arguments command =
+      program.command("fit-friction", "Fit friction laws to measured stick-slip, and predict what was not fitted");
   auto options = std::make_shared<FitFrictionOptions>();
   command
-      ->add_option("files", options->files,
-                   "Traces: CSV files with the columns t_s and friction_over_load (spring force over load), or folders "
-                   "of them. \"k168Nm\" and \"v42\" in a name are the spring's stiffness (N/m) and the drive's speed "
-                   "(um/s)")
-      ->required();
-  command->add_option("--laws", options->laws, "Friction laws, separated by commas; default: all")->delimiter(',');
+      .option("files", options->files,
+              "Traces: CSV files with the columns t_s and friction_over_load (spring force over load), or folders "
+              "of them. \"k168Nm\" and \"v42\" in a name are the spring's stiffness (N/m) and the drive's speed "
+              "(um/s)")
+      .required();
+  command.option("--laws", options->laws, "Friction laws, separated by commas; default: all").delimiter(',');
   command
-      ->add_option("--fit", options->fitted,
-                   "Traces to fit on, by name or a part of it, separated by commas; default: from the slowest and "
-                   "softest on every other one but the last")
-      ->delimiter(',');
-  command->add_option("--predict", options->predicted, "Traces to predict; default: those that are not fitted")
-      ->delimiter(',');
-  command->add_option("--stiffness", options->stiffness, "Of the spring (168N/m), where a file's name does not say");
-  command->add_option("--speed", options->speed, "Of the drive (0.042mm/s), where a file's name does not say");
-  command->add_option("--mass", options->mass, "Of the slider (20g); default: fitted");
-  command->add_option("--load", options->load, "Normal force on the slider (0.2N); default: its weight");
-  command->add_flag("--free-load", options->free_load, "Fit the load apart from the mass");
-  command->add_option("--seed", options->seed, "Of the search; the same seed finds the same")->capture_default_str();
-  command->add_option("--evaluations", options->evaluations, "Of the search, for each parameter of a law")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command->add_option("--out", options->out, "Folder of the outputs")->capture_default_str();
-  command->add_flag("--no-report", options->no_report, "Numbers only: no page");
-  add_console_options(*command, console);
-  command->footer(
+      .option("--fit", options->fitted,
+              "Traces to fit on, by name or a part of it, separated by commas; default: from the slowest and "
+              "softest on every other one but the last")
+      .delimiter(',');
+  command.option("--predict", options->predicted, "Traces to predict; default: those that are not fitted")
+      .delimiter(',');
+  command.option("--stiffness", options->stiffness, "Of the spring (168N/m), where a file's name does not say");
+  command.option("--speed", options->speed, "Of the drive (0.042mm/s), where a file's name does not say");
+  command.option("--mass", options->mass, "Of the slider (20g); default: fitted");
+  command.option("--load", options->load, "Normal force on the slider (0.2N); default: its weight");
+  command.flag("--free-load", options->free_load, "Fit the load apart from the mass");
+  command.option("--seed", options->seed, "Of the search; the same seed finds the same").shows_default();
+  command.option("--evaluations", options->evaluations, "Of the search, for each parameter of a law")
+      .between(1, 100000)
+      .shows_default();
+  command.option("--out", options->out, "Folder of the outputs").shows_default();
+  command.flag("--no-report", options->no_report, "Numbers only: no page");
+  add_console_options(command, console);
+  command.closing_words(
       "period: from peak to peak. amplitude: drop of an event, as friction over load. static/dynamic: mean peak over "
       "the mean middle of the drops. level: mean.\n"
       "misfit: root of the mean square of the five errors (those four, and the shape of a cycle); 0.1 is about 10 %.\n"
@@ -352,8 +352,8 @@ CLI::App* add_fit_friction(CLI::App& app, Console& console, Action& action) {
       "  asperity fit-friction friction/*.csv\n"
       "  asperity fit-friction friction --laws karnopp,lugre --fit k168Nm_v42,k168Nm_v1100\n"
       "  asperity fit-friction trace.csv --stiffness 168N/m --speed 0.042mm/s --mass 20g");
-  command->callback([options, &console, &action] { action = [options, &console] { return fit(*options, console); }; });
-  return command;
+  command.when_called(
+      [options, &console, &action] { action = [options, &console] { return fit(*options, console); }; });
 }
 
 }  // namespace asperity::program

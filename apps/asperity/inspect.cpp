@@ -481,31 +481,31 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand(
+void add_inspect(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command(
       "inspect", "Say what a mesh, map, volume, scene or trace is, what is wrong with it, and what can be felt of it");
   auto options = std::make_shared<InspectOptions>();
   command
-      ->add_option("FILE", options->file,
-                   "A mesh, a map (PNG, JPEG, EXR), a volume, a level set (.vdb), a scene, a built-in scene or a trace")
-      ->required();
-  command->add_flag("--implicit{256}", options->scene.implicit,
-                    "Of a mesh: judge the potential made from it (--implicit=128, --implicit=0.4mm)");
-  command->add_option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
-  command->add_option("--hand", options->scene.hand, "Hand to judge by: default, light, firm, paper");
-  command->add_option("--rate", options->scene.rate, "Force updates a second: 1kHz");
-  command->add_option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
-  command->add_option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
+      .option("FILE", options->file,
+              "A mesh, a map (PNG, JPEG, EXR), a volume, a level set (.vdb), a scene, a built-in scene or a trace")
+      .required();
+  command.flag("--implicit{256}", options->scene.implicit,
+               "Of a mesh: judge the potential made from it (--implicit=128, --implicit=0.4mm)");
+  command.option("--device", options->scene.device, "Device to judge by: phantom-desktop, omega.7, touch, ...");
+  command.option("--hand", options->scene.hand, "Hand to judge by: default, light, firm, paper");
+  command.option("--rate", options->scene.rate, "Force updates a second: 1kHz");
+  command.option("--height", options->scene.height, "Of a map: relief from black to white, 2mm");
+  command.option("--tile", options->scene.tile, "Of a map: width of one repeat, 20mm");
   command
-      ->add_option("--friction", options->friction,
-                   "Of a map, or of a scene's features: coefficient of friction of the material where it is smooth")
-      ->check(CLI::Range(0.0, 2.0))
-      ->capture_default_str();
-  command->add_option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");
-  command->add_option("--speed", options->scene.speed, "Of the hand: 20mm/s");
-  command->add_option("--force", options->scene.force, "Of the hand: 1N");
-  add_console_options(*command, console);
-  command->footer(
+      .option("--friction", options->friction,
+              "Of a map, or of a scene's features: coefficient of friction of the material where it is smooth")
+      .between(0.0, 2.0)
+      .shows_default();
+  command.option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");
+  command.option("--speed", options->scene.speed, "Of the hand: 20mm/s");
+  command.option("--force", options->scene.force, "Of the hand: 1N");
+  add_console_options(command, console);
+  command.closing_words(
       "Of a relief: whether it can be felt as it is, criterion by criterion (docs/methods/renderability.md), the "
       "nearest "
       "changes with which it can, and which devices render it.\n"
@@ -515,9 +515,8 @@ CLI::App* add_inspect(CLI::App& app, Console& console, Action& action) {
       "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
       "  asperity inspect kitchen.vtk\n"
       "  asperity inspect out/icosphere-relief/trace.asptrace --json");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

@@ -216,17 +216,15 @@ Result<int> run_library(const LibraryOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_library(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("library", "List the mesostructures that come along, or draw and write them");
+void add_library(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("library", "List the mesostructures that come along, or draw and write them");
   auto options = std::make_shared<LibraryOptions>();
-  command->add_option("NAME", options->names, "Only these");
-  command->add_option("--out", options->out,
-                      "Folder for 16-bit height maps with their sizes (.json), pictures and a page of them");
-  command->add_option("--size", options->size, "Texels a side of the height maps")
-      ->check(CLI::Range(16, 4096))
-      ->capture_default_str();
-  add_console_options(*command, console);
-  command->footer(
+  command.option("NAME", options->names, "Only these");
+  command.option("--out", options->out,
+                 "Folder for 16-bit height maps with their sizes (.json), pictures and a page of them");
+  command.option("--size", options->size, "Texels a side of the height maps").between(16, 4096).shows_default();
+  add_console_options(command, console);
+  command.closing_words(
       "Scenes take them by name: \"height_map\": {\"library\": \"linen\"}. Written ones are read by scenes as they "
       "are, "
       "and by other programs.\n"
@@ -234,9 +232,8 @@ CLI::App* add_library(CLI::App& app, Console& console, Action& action) {
       "  asperity library\n"
       "  asperity library --out library\n"
       "  asperity library linen denim --out cloth --size 1024");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return run_library(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

@@ -51,32 +51,29 @@ int fail(const std::string& message) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{
-      "Asperity renders fine surface detail to the hand: it slides a probe over a surface and answers the force at "
-      "every tick."};
   Console console;
   Action action;
   console.command_line = whole_command_line(argc, argv);
-  app.name(called_as(argc, argv));
-  app.footer(examples);
-  app.set_version_flag("--version", program_name());
-  app.require_subcommand(1);
-  add_touch(app, console, action);
-  add_compare(app, console, action);
-  add_replay(app, console, action);
-  add_inspect(app, console, action);
-  add_convert(app, console, action);
-  add_fit_friction(app, console, action);
-  add_score(app, console, action);
-  add_library(app, console, action);
-  add_scenes(app, console, action);
-  add_bench(app, console, action);
-  add_schema(app, console, action);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& problem) {
-    if (problem.get_exit_code() == 0) return app.exit(problem);
-    return fail(fmt::format("{}; asperity --help shows what is accepted", problem.what()));
+  CommandLine line(called_as(argc, argv),
+                   "Asperity renders fine surface detail to the hand: it slides a probe over a surface and answers the "
+                   "force at every tick.",
+                   program_name());
+  Arguments program = line.arguments();
+  program.closing_words(examples);
+  add_touch(program, console, action);
+  add_compare(program, console, action);
+  add_replay(program, console, action);
+  add_inspect(program, console, action);
+  add_convert(program, console, action);
+  add_fit_friction(program, console, action);
+  add_score(program, console, action);
+  add_library(program, console, action);
+  add_scenes(program, console, action);
+  add_bench(program, console, action);
+  add_schema(program, console, action);
+  std::string problem;
+  if (const std::optional<int> code = line.parse(argc, argv, problem)) {
+    return problem.empty() ? *code : fail(problem + "; asperity --help shows what is accepted");
   }
   const Result<int> code = action();
   if (!code) return fail(code.error().message());

@@ -101,19 +101,18 @@ Result<int> replay(const std::string& path, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_replay(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("replay", "Render a recorded run again; every force must be bit-equal");
+void add_replay(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("replay", "Render a recorded run again; every force must be bit-equal");
   auto path = std::make_shared<std::string>();
-  command->add_option("TRACE", *path, "A trace written by asperity touch")->required();
-  add_console_options(*command, console);
-  command->footer(
+  command.option("TRACE", *path, "A trace written by asperity touch").required();
+  add_console_options(command, console);
+  command.closing_words(
       "The scene is rebuilt from the trace; meshes and maps are read from where they were. Exit code 1: a force "
       "differs, or the trace is cut.\n"
       "Examples:\n"
       "  asperity replay out/icosphere-relief/trace.asptrace\n"
       "  asperity replay out/bunny/trace.asptrace --json");
-  command->callback([path, &console, &action] { action = [path, &console] { return replay(*path, console); }; });
-  return command;
+  command.when_called([path, &console, &action] { action = [path, &console] { return replay(*path, console); }; });
 }
 
 }  // namespace asperity::program

@@ -188,41 +188,41 @@ void change_stroke(Json& scene, const SceneArgument& a, bool loops) {
 
 }  // namespace
 
-void add_scene_options(CLI::App& command, SceneArgument& a) {
+void add_scene_options(Arguments& command, SceneArgument& a) {
   command
-      .add_option("SCENE", a.scene,
-                  "A scene file, a mesh (OBJ, PLY, STL, glTF), a level set (.vdb), a volume (VTK, OpenFOAM, NRRD, raw, "
-                  ".aspvol), or a built-in scene (asperity scenes)")
-      ->capture_default_str();
-  command.add_option("--relief", a.relief, "Height map (PNG, JPEG, EXR) to lay on every surface")->group("Relief");
-  command.add_option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge")->group("Relief");
-  command.add_option("--tile", a.tile, "Width of one repeat of the map, for meshes without texture coordinates: 20mm")
-      ->group("Relief");
-  command.add_option("--normal-map", a.normal_map, "Normal map that belongs to the relief")->group("Relief");
-  command.add_option("--channel", a.channel, "Channel of the heights: automatic, luminance, red, green, blue, alpha")
-      ->group("Relief");
-  command.add_option("--white-is", a.white_is, "high, or deep for depth maps")->group("Relief");
-  command.add_option("--mapping", a.mapping, "auto, uv, per_face, triplanar")->group("Relief");
-  command.add_option("--magnify", a.magnify, "Factor on heights and tile, for surfaces measured in micrometres")
-      ->group("Relief");
-  command.add_option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in")->group("Mesh");
-  command.add_option("--fit", a.fit, "workspace, none, or the largest side: 80mm")->group("Mesh");
-  command.add_option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z")->group("Mesh");
+      .option("SCENE", a.scene,
+              "A scene file, a mesh (OBJ, PLY, STL, glTF), a level set (.vdb), a volume (VTK, OpenFOAM, NRRD, raw, "
+              ".aspvol), or a built-in scene (asperity scenes)")
+      .shows_default();
+  command.option("--relief", a.relief, "Height map (PNG, JPEG, EXR) to lay on every surface").group("Relief");
+  command.option("--height", a.height, "Relief from black to white: 2mm, or 10% of the mean edge").group("Relief");
+  command.option("--tile", a.tile, "Width of one repeat of the map, for meshes without texture coordinates: 20mm")
+      .group("Relief");
+  command.option("--normal-map", a.normal_map, "Normal map that belongs to the relief").group("Relief");
+  command.option("--channel", a.channel, "Channel of the heights: automatic, luminance, red, green, blue, alpha")
+      .group("Relief");
+  command.option("--white-is", a.white_is, "high, or deep for depth maps").group("Relief");
+  command.option("--mapping", a.mapping, "auto, uv, per_face, triplanar").group("Relief");
+  command.option("--magnify", a.magnify, "Factor on heights and tile, for surfaces measured in micrometres")
+      .group("Relief");
+  command.option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in").group("Mesh");
+  command.option("--fit", a.fit, "workspace, none, or the largest side: 80mm").group("Mesh");
+  command.option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z").group("Mesh");
   command
-      .add_flag("--implicit{256}", a.implicit,
-                "Feel meshes through a potential made from them: so many voxels along the longest side, or a voxel "
-                "(--implicit=128, --implicit=0.4mm)")
-      ->group("Mesh");
-  command.add_option("--stiffness", a.stiffness, "Of every surface: 1000, 0.5N/mm")->group("Touch");
-  command.add_option("--damping", a.damping, "Of every surface: 0.5 (N s/m)")->group("Touch");
-  auto* depth = command.add_option("--depth", a.depth, "Lead the probe at this depth: 1mm")->group("Touch");
-  command.add_option("--force", a.force, "Press with this normal force: 1N")->excludes(depth)->group("Touch");
-  command.add_option("--speed", a.speed, "Along the surface: 20mm/s")->group("Touch");
-  command.add_option("--device", a.device, "Device profile: phantom-desktop, omega.7, touch, ...")->group("Touch");
-  command.add_option("--hand", a.hand, "Hand: default, light, firm, paper (with --probe dynamic)")->group("Touch");
-  command.add_option("--rate", a.rate, "Force updates a second: 1kHz")->group("Touch");
-  command.add_option("--probe", a.probe, "ideal, or dynamic: a simulated hand that holds the device")->group("Touch");
-  command.add_option("--probe-radius", a.probe_radius, "Radius of the tip: 0.5mm; 0 is a point")->group("Touch");
+      .flag("--implicit{256}", a.implicit,
+            "Feel meshes through a potential made from them: so many voxels along the longest side, or a voxel "
+            "(--implicit=128, --implicit=0.4mm)")
+      .group("Mesh");
+  command.option("--stiffness", a.stiffness, "Of every surface: 1000, 0.5N/mm").group("Touch");
+  command.option("--damping", a.damping, "Of every surface: 0.5 (N s/m)").group("Touch");
+  const Argument depth = command.option("--depth", a.depth, "Lead the probe at this depth: 1mm").group("Touch");
+  command.option("--force", a.force, "Press with this normal force: 1N").excludes(depth).group("Touch");
+  command.option("--speed", a.speed, "Along the surface: 20mm/s").group("Touch");
+  command.option("--device", a.device, "Device profile: phantom-desktop, omega.7, touch, ...").group("Touch");
+  command.option("--hand", a.hand, "Hand: default, light, firm, paper (with --probe dynamic)").group("Touch");
+  command.option("--rate", a.rate, "Force updates a second: 1kHz").group("Touch");
+  command.option("--probe", a.probe, "ideal, or dynamic: a simulated hand that holds the device").group("Touch");
+  command.option("--probe-radius", a.probe_radius, "Radius of the tip: 0.5mm; 0 is a point").group("Touch");
 }
 
 Result<SceneText> find_scene(const std::string& scene) {

@@ -2,7 +2,6 @@
 // What a command is pointed at: a scene file, a built-in scene, or a mesh or volume alone; and the options that change
 // it.
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 
@@ -24,7 +23,7 @@ struct SceneArgument {
 };
 
 /// Adds SCENE and the options that change it.
-void add_scene_options(CLI::App& command, SceneArgument& argument);
+void add_scene_options(Arguments& command, SceneArgument& argument);
 
 /// Reads the scene by writing scene JSON with the changes and giving it to the one reader that there is.
 /// `loops`: let an open stroke go there and back, so that energy over closed loops can be told. [main]

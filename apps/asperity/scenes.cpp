@@ -35,37 +35,35 @@ Result<int> print_scene(const std::string& name) {
 
 }  // namespace
 
-CLI::App* add_scenes(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("scenes", "List the built-in scenes, or print one");
+void add_scenes(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("scenes", "List the built-in scenes, or print one");
   auto name = std::make_shared<std::string>();
-  command->add_option("NAME", *name, "Print this scene's JSON");
-  add_console_options(*command, console);
-  command->footer(
+  command.option("NAME", *name, "Print this scene's JSON");
+  add_console_options(command, console);
+  command.closing_words(
       "A printed scene is a good start for one of your own.\n"
       "Examples:\n"
       "  asperity scenes\n"
       "  asperity scenes M_a-H_3 > mine.json");
-  command->callback([name, &console, &action] {
+  command.when_called([name, &console, &action] {
     action = [name, &console] { return name->empty() ? list_scenes(console) : print_scene(*name); };
   });
-  return command;
 }
 
-CLI::App* add_schema(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("schema", "Print the JSON Schema of scene files");
-  add_console_options(*command, console, false);
-  command->footer(
+void add_schema(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("schema", "Print the JSON Schema of scene files");
+  add_console_options(command, console, false);
+  command.closing_words(
       "Every key with its unit, range and default. Editors complete and check scenes with it (\"$schema\": "
       "\"scene.schema.json\").\n"
       "Example:\n"
       "  asperity schema > scene.schema.json");
-  command->callback([&action] {
+  command.when_called([&action] {
     action = []() -> Result<int> {
       std::cout << scene_schema_json();
       return exit_success;
     };
   });
-  return command;
 }
 
 }  // namespace asperity::program

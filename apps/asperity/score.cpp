@@ -104,7 +104,7 @@ Result<MeasuredPath> read_path(const ScoreOptions& options) {
   return path;
 }
 
-Json finite(double value) {
+Json finite_or_null(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
@@ -118,15 +118,15 @@ Json score_json(const PathScore& score, const MeasuredPath& path) {
       {"compared", e.compared},
       {"rms_measured_n", e.rms_measured},
       {"rms_error_n", e.rms_error},
-      {"relative_error", finite(e.relative)},
+      {"relative_error", finite_or_null(e.relative)},
       {"mean_error_n", e.mean_error},
       {"largest_error_n", e.largest_error},
       {"largest_error_at_s", path.samples[e.largest_at].time.count()},
       {"peak_measured_n", e.peak_measured},
       {"peak_rendered_n", e.peak_rendered},
       {"peak_error_n", e.peak_rendered - e.peak_measured},
-      {"mean_angle_rad", finite(e.mean_angle)},
-      {"largest_angle_rad", finite(e.largest_angle)},
+      {"mean_angle_rad", finite_or_null(e.mean_angle)},
+      {"largest_angle_rad", finite_or_null(e.largest_angle)},
       {"normal_error",
        {{"samples", score.normal.samples},
         {"mean_rad", score.normal.mean},
@@ -230,53 +230,50 @@ Result<int> score(const ScoreOptions& options, const Console& console) {
   return exit_success;
 }
 
-void add_surface_options(CLI::App& command, SceneArgument& a) {
-  command.add_option("--scene", a.scene,
-                     "The surface it was measured on: a scene file, a mesh, a volume or a built-in scene; default: the "
-                     "trace's own");
-  command.add_option("--relief", a.relief, "Height map (PNG, JPEG, EXR) to lay on every surface")->group("Relief");
-  command.add_option("--height", a.height, "Relief from black to white: 2mm")->group("Relief");
-  command.add_option("--tile", a.tile, "Width of one repeat of the map: 20mm")->group("Relief");
-  command.add_option("--mapping", a.mapping, "auto, uv, per_face, triplanar")->group("Relief");
-  command.add_option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in")->group("Mesh");
-  command.add_option("--fit", a.fit, "workspace, none, or the largest side: 80mm")->group("Mesh");
-  command.add_option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z")->group("Mesh");
-  command.add_option("--stiffness", a.stiffness, "Of every surface, and of the path's correction: 1000, 0.5N/mm")
-      ->group("Touch");
-  command.add_option("--rate", a.rate, "Ticks a second at least: 1kHz")->group("Touch");
-  command.add_option("--probe-radius", a.probe_radius, "Radius of the tip whose middle was measured: 0.5mm")
-      ->group("Touch");
+void add_surface_options(Arguments& command, SceneArgument& a) {
+  command.option("--scene", a.scene,
+                 "The surface it was measured on: a scene file, a mesh, a volume or a built-in scene; default: the "
+                 "trace's own");
+  command.option("--relief", a.relief, "Height map (PNG, JPEG, EXR) to lay on every surface").group("Relief");
+  command.option("--height", a.height, "Relief from black to white: 2mm").group("Relief");
+  command.option("--tile", a.tile, "Width of one repeat of the map: 20mm").group("Relief");
+  command.option("--mapping", a.mapping, "auto, uv, per_face, triplanar").group("Relief");
+  command.option("--units", a.units, "Unit of the mesh file: m, cm, mm, um, in").group("Mesh");
+  command.option("--fit", a.fit, "workspace, none, or the largest side: 80mm").group("Mesh");
+  command.option("--up", a.up, "The mesh's axis that points up: x, y, z, -x, -y, -z").group("Mesh");
+  command.option("--stiffness", a.stiffness, "Of every surface, and of the path's correction: 1000, 0.5N/mm")
+      .group("Touch");
+  command.option("--rate", a.rate, "Ticks a second at least: 1kHz").group("Touch");
+  command.option("--probe-radius", a.probe_radius, "Radius of the tip whose middle was measured: 0.5mm").group("Touch");
 }
 
 }  // namespace
 
-CLI::App* add_score(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("score", "Score laws on a measured trajectory: a probe's path with its forces");
+void add_score(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("score", "Score laws on a measured trajectory: a probe's path with its forces");
   auto options = std::make_shared<ScoreOptions>();
   options->scene.scene.clear();
   command
-      ->add_option(
-          "FILE", options->file,
-          "CSV with the columns time, x, y, z, fx, fy, fz in the scene's frame, units as suffix or in brackets "
-          "(x_mm, \"x [mm]\"), SI without; or a trace")
-      ->required();
-  add_surface_options(*command, options->scene);
+      .option("FILE", options->file,
+              "CSV with the columns time, x, y, z, fx, fy, fz in the scene's frame, units as suffix or in brackets "
+              "(x_mm, \"x [mm]\"), SI without; or a trace")
+      .required();
+  add_surface_options(command, options->scene);
   command
-      ->add_option("--laws", options->laws,
-                   "Laws, separated by commas, as in asperity compare; default: those that suit the scene")
-      ->delimiter(',');
+      .option("--laws", options->laws,
+              "Laws, separated by commas, as in asperity compare; default: those that suit the scene")
+      .delimiter(',');
   command
-      ->add_option("--positions", options->positions,
-                   "surface: on the true surface, so that laws are driven at x - F / k (default of CSV files); probe: "
-                   "of a device's probe, where laws are driven as it is (default of traces)")
-      ->check(CLI::IsMember(all_names<PathPlace>()));
-  command->add_flag("--synthesise", options->synthesise,
-                    "First write FILE: what the exact geometry answers on the scene's stroke");
-  command->add_option("--out", options->out, "Folder of the outputs; default out/FILE-score");
-  command->add_flag("--no-report", options->no_report, "Numbers only: no page");
-  add_console_options(*command, console);
-  command->footer(
+      .option("--positions", options->positions,
+              "surface: on the true surface, so that laws are driven at x - F / k (default of CSV files); probe: "
+              "of a device's probe, where laws are driven as it is (default of traces)")
+      .one_of(all_names<PathPlace>());
+  command.flag("--synthesise", options->synthesise,
+               "First write FILE: what the exact geometry answers on the scene's stroke");
+  command.option("--out", options->out, "Folder of the outputs; default out/FILE-score");
+  command.flag("--no-report", options->no_report, "Numbers only: no page");
+  add_console_options(command, console);
+  command.closing_words(
       "dF: the law's force less the measured one, over samples where either is above 1 mN. angle: between the two. "
       "normal: mean angle of the law's force to the true surface's normal.\n"
       "missed: share of the measured contact where the law answers nothing; added: the other way round. penetration: "
@@ -285,9 +282,8 @@ CLI::App* add_score(CLI::App& app, Console& console, Action& action) {
       "  asperity score reference.csv --scene M_a-H_3 --synthesise\n"
       "  asperity score scan.csv --scene bunny.obj --units mm --fit none --laws proxy,god-object\n"
       "  asperity score out/M_a-H_3/trace.asptrace --laws proxy,mesostructure,force-shading");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return score(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

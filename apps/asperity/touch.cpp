@@ -183,21 +183,20 @@ Result<int> touch(const TouchOptions& options, const Console& console) {
 
 }  // namespace
 
-CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
-  CLI::App* command = app.add_subcommand("touch", "Slide a probe over a scene; write trace, numbers and report");
+void add_touch(Arguments& program, Console& console, Action& action) {
+  Arguments command = program.command("touch", "Slide a probe over a scene; write trace, numbers and report");
   auto options = std::make_shared<TouchOptions>();
-  add_scene_options(*command, options->scene);
+  add_scene_options(command, options->scene);
   command
-      ->add_option(
-          "--law", options->scene.law,
-          "Of every surface: proxy, god-object, force-shading, height-field, mesostructure, generated-geometry, "
-          "dense-mesh; with --implicit proxy, virtual-contact-point, magnetic, avila; -literal as printed")
-      ->group("Touch");
-  command->add_option("--out", options->out, "Folder of the outputs; default out/SCENE");
-  command->add_flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
-  command->add_flag("--csv", options->csv, "The trace as a table as well (trace.csv, trace.json)");
-  add_console_options(*command, console);
-  command->footer(
+      .option("--law", options->scene.law,
+              "Of every surface: proxy, god-object, force-shading, height-field, mesostructure, generated-geometry, "
+              "dense-mesh; with --implicit proxy, virtual-contact-point, magnetic, avila; -literal as printed")
+      .group("Touch");
+  command.option("--out", options->out, "Folder of the outputs; default out/SCENE");
+  command.flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
+  command.flag("--csv", options->csv, "The trace as a table as well (trace.csv, trace.json)");
+  add_console_options(command, console);
+  command.closing_words(
       "A mesh alone, or a mesh and a map, is a scene: the mesh is fitted to the device's workspace, the map is laid on "
       "it.\n"
       "Examples:\n"
@@ -206,9 +205,8 @@ CLI::App* add_touch(CLI::App& app, Console& console, Action& action) {
       "  asperity touch bunny.obj --implicit --law virtual-contact-point\n"
       "  asperity touch M_a-H_3 --law height-field-literal --force 1N\n"
       "  asperity touch my.json --probe dynamic --device omega.7 --json --no-report");
-  command->callback(
+  command.when_called(
       [options, &console, &action] { action = [options, &console] { return touch(*options, console); }; });
-  return command;
 }
 
 }  // namespace asperity::program

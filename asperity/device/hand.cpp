@@ -11,7 +11,7 @@
 namespace asperity {
 namespace {
 
-const std::array<HandImpedance, 4>& table() {
+const std::array<HandImpedance, 4>& hand_table() {
   static const std::array<HandImpedance, 4> hands{
       HandImpedance{"default", 0.15, 6.0, 400.0, 4.0},
       HandImpedance{"light", 0.05, 2.0, 100.0, 4.0},
@@ -21,7 +21,7 @@ const std::array<HandImpedance, 4>& table() {
   return hands;
 }
 
-Status require(bool good, const char* field, double value, const char* accepted) {
+Status require_of_hand(bool good, const char* field, double value, const char* accepted) {
   if (good && std::isfinite(value)) return success();
   return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, field, accepted};
 }
@@ -29,17 +29,17 @@ Status require(bool good, const char* field, double value, const char* accepted)
 }  // namespace
 
 std::span<const HandImpedance> hand_presets() {
-  return table();
+  return hand_table();
 }
 
 std::vector<std::string> hand_preset_names() {
   std::vector<std::string> names;
-  for (const HandImpedance& hand : table()) names.push_back(hand.name);
+  for (const HandImpedance& hand : hand_table()) names.push_back(hand.name);
   return names;
 }
 
 Result<HandImpedance> find_hand(std::string_view name) {
-  for (const HandImpedance& hand : table()) {
+  for (const HandImpedance& hand : hand_table()) {
     if (edit_distance(name, hand.name) == 0) return hand;
   }
   const std::vector<std::string> names = hand_preset_names();
@@ -53,10 +53,10 @@ Result<HandImpedance> find_hand(std::string_view name) {
 }
 
 Status validate_hand(const HandImpedance& hand) {
-  ASPERITY_CHECK(require(hand.mass > 0.0, "mass", hand.mass, "a mass above 0 (kg)"));
-  ASPERITY_CHECK(require(hand.damping >= 0.0, "damping", hand.damping, "a damping of 0 or more (N s/m)"));
-  ASPERITY_CHECK(require(hand.stiffness > 0.0, "stiffness", hand.stiffness, "a stiffness above 0 (N/m)"));
-  return require(hand.lateral_limit > 0.0, "lateral_limit", hand.lateral_limit, "a force above 0 (N)");
+  ASPERITY_CHECK(require_of_hand(hand.mass > 0.0, "mass", hand.mass, "a mass above 0 (kg)"));
+  ASPERITY_CHECK(require_of_hand(hand.damping >= 0.0, "damping", hand.damping, "a damping of 0 or more (N s/m)"));
+  ASPERITY_CHECK(require_of_hand(hand.stiffness > 0.0, "stiffness", hand.stiffness, "a stiffness above 0 (N/m)"));
+  return require_of_hand(hand.lateral_limit > 0.0, "lateral_limit", hand.lateral_limit, "a force above 0 (N)");
 }
 
 }  // namespace asperity

@@ -19,7 +19,7 @@ Error bad_value(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
-Status require(bool good, double value, const char* place, const char* accepted) {
+Status require_of_stroke(bool good, double value, const char* place, const char* accepted) {
   if (good && std::isfinite(value)) return success();
   return bad_value(place, fmt::format("is {}", value), accepted);
 }
@@ -30,13 +30,15 @@ Status require_finite(const Vec3& value, const std::string& place) {
 }
 
 Status validate_motion(const StrokeSettings& s) {
-  ASPERITY_CHECK(require(s.speed > 0.0, s.speed, "speed", "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(require(s.approach_speed > 0.0, s.approach_speed, "approach_speed", "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(require(s.approach_height >= 0.0, s.approach_height, "approach_height", "a length of 0 or more (m)"));
+  ASPERITY_CHECK(require_of_stroke(s.speed > 0.0, s.speed, "speed", "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(
+      require_of_stroke(s.approach_speed > 0.0, s.approach_speed, "approach_speed", "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(
+      require_of_stroke(s.approach_height >= 0.0, s.approach_height, "approach_height", "a length of 0 or more (m)"));
   if (s.press == PressMode::force) {
-    ASPERITY_CHECK(require(s.normal_force > 0.0, s.normal_force, "normal_force", "a force above 0 (N)"));
+    ASPERITY_CHECK(require_of_stroke(s.normal_force > 0.0, s.normal_force, "normal_force", "a force above 0 (N)"));
   } else {
-    ASPERITY_CHECK(require(true, s.depth, "depth", "a finite length (m)"));
+    ASPERITY_CHECK(require_of_stroke(true, s.depth, "depth", "a finite length (m)"));
   }
   if (s.repeats < 1) return bad_value("repeats", fmt::format("is {}", s.repeats), "1 or more");
   return success();
@@ -44,21 +46,22 @@ Status validate_motion(const StrokeSettings& s) {
 
 Status validate_sampling(const StrokeSettings& s) {
   if (s.sample_spacing) {
-    ASPERITY_CHECK(require(*s.sample_spacing > 0.0, *s.sample_spacing, "sample_spacing", "a length above 0 (m)"));
+    ASPERITY_CHECK(
+        require_of_stroke(*s.sample_spacing > 0.0, *s.sample_spacing, "sample_spacing", "a length above 0 (m)"));
   }
   if (s.normal_smoothing) {
-    ASPERITY_CHECK(
-        require(*s.normal_smoothing >= 0.0, *s.normal_smoothing, "normal_smoothing", "a length of 0 or more (m)"));
+    ASPERITY_CHECK(require_of_stroke(*s.normal_smoothing >= 0.0, *s.normal_smoothing, "normal_smoothing",
+                                     "a length of 0 or more (m)"));
   }
   return success();
 }
 
 Status validate_round(const StrokeSettings& s) {
   ASPERITY_CHECK(require_finite(s.centre, "centre"));
-  ASPERITY_CHECK(require(s.radius > 0.0, s.radius, "radius", "a length above 0 (m)"));
+  ASPERITY_CHECK(require_of_stroke(s.radius > 0.0, s.radius, "radius", "a length above 0 (m)"));
   const bool by_pitch = s.type == StrokeType::spiral && s.pitch != 0.0;
-  if (by_pitch) return require(s.pitch > 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use turns");
-  return require(s.turns > 0.0 && s.turns <= 1e4, s.turns, "turns", "a number above 0, up to 10000");
+  if (by_pitch) return require_of_stroke(s.pitch > 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use turns");
+  return require_of_stroke(s.turns > 0.0 && s.turns <= 1e4, s.turns, "turns", "a number above 0, up to 10000");
 }
 
 /// Two unit vectors that span the plane across `axis`, the same for the same axis: u lies along +x when it can.
@@ -134,7 +137,7 @@ Result<Guide> raster_guide(const StrokeSettings& s) {
   ASPERITY_CHECK(require_finite(s.start, "start"));
   ASPERITY_CHECK(require_finite(s.end, "end"));
   ASPERITY_TRY(const Plane plane, plane_across(s.axis));
-  ASPERITY_CHECK(require(s.pitch >= 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use rows"));
+  ASPERITY_CHECK(require_of_stroke(s.pitch >= 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use rows"));
   const Vec3 diagonal = s.end - s.start;
   const double along = diagonal.dot(plane.u);
   const double across = diagonal.dot(plane.v);

@@ -72,11 +72,7 @@ Status read_all(int descriptor, const std::string& name, std::uint64_t from, cha
 }
 
 std::uint64_t stride_of(SampleType type) {
-  return (brick_bytes(type) + brick_alignment - 1) / brick_alignment * brick_alignment;
-}
-
-std::uint64_t padded(std::uint64_t bytes) {
-  return (bytes + brick_alignment - 1) / brick_alignment * brick_alignment;
+  return brick_aligned(brick_bytes(type));
 }
 
 /// The sizes that a prefix states, against each other and the file's length: afterwards they are safe to allocate by.
@@ -118,9 +114,9 @@ Status check_sizes(const BrickFilePrefix& prefix, std::uint64_t length, const st
   if (prefix.header_bytes != header)
     return malformed(fmt::format("has a header of {} bytes", prefix.header_bytes),
                      offsetof(BrickFilePrefix, header_bytes), fmt::format("{} by its own counts", header));
-  if (padded(header) + prefix.bricks * stride != length)
+  if (brick_aligned(header) + prefix.bricks * stride != length)
     return malformed(fmt::format("has {} bytes", length), offsetof(BrickFilePrefix, file_bytes),
-                     fmt::format("{} by its own counts", padded(header) + prefix.bricks * stride));
+                     fmt::format("{} by its own counts", brick_aligned(header) + prefix.bricks * stride));
   if (!std::isfinite(prefix.lowest) || !std::isfinite(prefix.highest) || prefix.lowest > prefix.highest)
     return malformed(fmt::format("has values from {} to {}", prefix.lowest, prefix.highest),
                      offsetof(BrickFilePrefix, lowest), "finite numbers that do not decrease");
@@ -188,7 +184,7 @@ Status read_tables(Cursor& cursor, const BrickFilePrefix& prefix, const std::str
     record.range.lower = cursor.take<float>();
     record.range.upper = cursor.take<float>();
     record.checksum = cursor.take<std::uint64_t>();
-    if (record.offset % brick_alignment != 0 || record.offset < padded(prefix.header_bytes) ||
+    if (record.offset % brick_alignment != 0 || record.offset < brick_aligned(prefix.header_bytes) ||
         record.offset > header.file_bytes - stride)
       return at_byte(ErrorCode::file_malformed, fmt::format("has brick {} at byte {}", n, record.offset), file, from,
                      fmt::format("a multiple of {} within the file", brick_alignment));

@@ -31,6 +31,10 @@ inline constexpr std::uint32_t brick_cells = 32;
 inline constexpr std::uint32_t brick_nodes = brick_cells + 3;
 inline constexpr std::size_t brick_samples = std::size_t{brick_nodes} * brick_nodes * brick_nodes;
 inline constexpr std::uint64_t brick_alignment = 4096;
+/// The next multiple of it (bytes). [any]
+constexpr std::uint64_t brick_aligned(std::uint64_t bytes) {
+  return (bytes + brick_alignment - 1) / brick_alignment * brick_alignment;
+}
 
 /// One level of a bricked volume.
 struct BrickLevel {

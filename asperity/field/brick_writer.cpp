@@ -24,10 +24,6 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
-std::uint64_t padded(std::uint64_t bytes) {
-  return (bytes + brick_alignment - 1) / brick_alignment * brick_alignment;
-}
-
 /// A file written aside: renamed when it is whole, removed when it is not.
 class AsideFile {
  public:
@@ -139,7 +135,7 @@ class LevelWriter {
         file_(file),
         layer_(static_cast<std::size_t>(level_.axes[0].size()) * level_.axes[1].size()),
         ring_(layer_ * std::min(brick_nodes, level_.axes[2].size())),
-        brick_(padded(brick_bytes(header.type))) {
+        brick_(brick_aligned(brick_bytes(header.type))) {
     if (level + 1 == header.levels.size()) return;
     next_ = std::make_unique<LevelWriter>(header, level + 1, file);
     for (std::size_t a = 0; a < 3; ++a) smoothing_[a] = smoothings(level_.axes[a], next_->level_.axes[a].size());
@@ -304,8 +300,8 @@ Result<BrickFileSummary> write_brick_file(const std::filesystem::path& path, con
   if (!levels) return std::move(levels).error().in_file(path.string());
   header.levels = std::move(*levels);
   header.bricks.resize(std::size_t{header.levels.back().first} + header.levels.back().count());
-  const std::uint64_t bricks_at = padded(encode_brick_header(header).size());
-  const std::uint64_t stride = padded(brick_bytes(type));
+  const std::uint64_t bricks_at = brick_aligned(encode_brick_header(header).size());
+  const std::uint64_t stride = brick_aligned(brick_bytes(type));
   for (std::size_t n = 0; n < header.bricks.size(); ++n) header.bricks[n].offset = bricks_at + stride * n;
   header.file_bytes = bricks_at + stride * header.bricks.size();
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t roughness_channel = 4;
 
-Error bad(std::string place, std::string what, std::string accepted) {
+Error bad_brush(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
@@ -24,9 +24,9 @@ Status check_channels(const PointMaterial& material, const std::string& place) {
     if (std::isnan(value)) continue;
     const bool above_zero = channel == 0;
     if (std::isfinite(value) && (above_zero ? value > 0.0F : value >= 0.0F)) continue;
-    return bad(fmt::format("{}.{}", place, material_channel_names()[channel]),
-               fmt::format("is {}{}", value, units[channel]),
-               fmt::format("a finite value, {}{}", above_zero ? "above 0" : "0 or more", units[channel]));
+    return bad_brush(fmt::format("{}.{}", place, material_channel_names()[channel]),
+                     fmt::format("is {}{}", value, units[channel]),
+                     fmt::format("a finite value, {}{}", above_zero ? "above 0" : "0 or more", units[channel]));
   }
   return success();
 }
@@ -39,17 +39,17 @@ bool is_empty(const PointMaterial& material) {
 }
 
 Status check_brush(const MaterialBrush& brush, const std::string& place) {
-  if (!brush.centre.allFinite()) return bad(place + ".centre", "is not finite", "three finite lengths (m)");
+  if (!brush.centre.allFinite()) return bad_brush(place + ".centre", "is not finite", "three finite lengths (m)");
   if (!(brush.radius > 0.0) || !std::isfinite(brush.radius))
-    return bad(place + ".radius", fmt::format("is {} m", brush.radius), "a length above 0");
+    return bad_brush(place + ".radius", fmt::format("is {} m", brush.radius), "a length above 0");
   if (!(brush.falloff >= 0.0 && brush.falloff <= brush.radius)) {
-    return bad(place + ".falloff", fmt::format("is {} m", brush.falloff),
-               fmt::format("0 up to the radius, {} m", brush.radius));
+    return bad_brush(place + ".falloff", fmt::format("is {} m", brush.falloff),
+                     fmt::format("0 up to the radius, {} m", brush.radius));
   }
   ASPERITY_CHECK(check_channels(brush.material, place));
   if (is_empty(brush.material)) {
-    return bad(place, "gives no channel a value",
-               "at least one of stiffness, damping, static_friction, dynamic_friction, roughness");
+    return bad_brush(place, "gives no channel a value",
+                     "at least one of stiffness, damping, static_friction, dynamic_friction, roughness");
   }
   return success();
 }
@@ -77,9 +77,9 @@ class Painting {
       reached = lay_on(b, brush, number) || reached;
     }
     if (reached) return success();
-    return bad(fmt::format("[{}]", number), "touches no stored point",
-               fmt::format("a ball that reaches the surface; points are stored near it, {:.4g} mm apart",
-                           1e3 * source_.voxel));
+    return bad_brush(fmt::format("[{}]", number), "touches no stored point",
+                     fmt::format("a ball that reaches the surface; points are stored near it, {:.4g} mm apart",
+                                 1e3 * source_.voxel));
   }
 
   /// The blocks that have changed.
@@ -153,10 +153,11 @@ class Painting {
       const float sliding = std::isnan(material.dynamic_friction) ? own_.dynamic_friction : material.dynamic_friction;
       if (!(at_rest < sliding)) continue;
       if (at_rest < sliding * (1.0F - rounding)) {
-        return bad(fmt::format("[{}].static_friction", touched_[b][point]),
-                   fmt::format("is {} where dynamic_friction is {}, other brushes and the surface's own considered",
-                               at_rest, sliding),
-                   "a static friction not below the dynamic one everywhere");
+        return bad_brush(
+            fmt::format("[{}].static_friction", touched_[b][point]),
+            fmt::format("is {} where dynamic_friction is {}, other brushes and the surface's own considered", at_rest,
+                        sliding),
+            "a static friction not below the dynamic one everywhere");
       }
       if (std::isnan(material.static_friction)) {
         material.dynamic_friction = at_rest;
@@ -183,8 +184,8 @@ Result<SparseGrid> painted(const SparseGrid& grid, std::span<const MaterialBrush
     ASPERITY_CHECK(check_brush(brushes[n], fmt::format("[{}]", n)));
     for (std::size_t channel = 0; channel < material_channels; ++channel) {
       if (std::isnan(brushes[n].material.get(channel)) || !std::isnan(fallback.get(channel))) continue;
-      return bad(fmt::format("own.{}", material_channel_names()[channel]), "is not given, and a brush fades to it",
-                 "the surface's own value");
+      return bad_brush(fmt::format("own.{}", material_channel_names()[channel]),
+                       "is not given, and a brush fades to it", "the surface's own value");
     }
   }
   Painting painting(grid, fallback);

@@ -30,7 +30,7 @@ std::atomic<MeshVoxelizer>& registered() {
   return voxelizer;
 }
 
-Error bad(std::string place, std::string what, std::string accepted) {
+Error bad_conversion(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
@@ -40,29 +40,34 @@ double longest_side(const TriangleMesh& mesh) {
 
 Status check_settings(const TriangleMesh& mesh, const ConversionSettings& settings) {
   const auto no_length = [](double value) { return !(value >= 0.0) || std::isinf(value); };
-  if (no_length(settings.voxel)) return bad("voxel", fmt::format("is {}", settings.voxel), "a length above 0 (m)");
+  if (no_length(settings.voxel))
+    return bad_conversion("voxel", fmt::format("is {}", settings.voxel), "a length above 0 (m)");
   const int given =
       (settings.voxel > 0.0 ? 1 : 0) + (settings.resolution > 0 ? 1 : 0) + (settings.budget_bytes > 0 ? 1 : 0);
-  if (given > 1) return bad("voxel", "is given besides another size", "one of voxel, resolution and budget");
+  if (given > 1) return bad_conversion("voxel", "is given besides another size", "one of voxel, resolution and budget");
   if (settings.resolution > 0 && (settings.resolution < static_cast<std::uint32_t>(least_resolution) ||
                                   settings.resolution > static_cast<std::uint32_t>(most_resolution)))
-    return bad("resolution", fmt::format("is {}", settings.resolution), "8 to 4096 voxels along the longest side");
+    return bad_conversion("resolution", fmt::format("is {}", settings.resolution),
+                          "8 to 4096 voxels along the longest side");
   const double longest = longest_side(mesh);
   if (settings.voxel > 0.0 && (settings.voxel < longest / most_resolution * (1.0 - 1e-9) ||
                                settings.voxel > longest / least_resolution * (1.0 + 1e-9))) {
-    return bad("voxel", fmt::format("is {} m, on a mesh {} m long", settings.voxel, longest),
-               fmt::format("{} to {} m: 8 to 4096 voxels along the longest side", longest / most_resolution,
-                           longest / least_resolution));
+    return bad_conversion("voxel", fmt::format("is {} m, on a mesh {} m long", settings.voxel, longest),
+                          fmt::format("{} to {} m: 8 to 4096 voxels along the longest side", longest / most_resolution,
+                                      longest / least_resolution));
   }
   if (no_length(settings.band_outside))
-    return bad("band_outside", fmt::format("is {}", settings.band_outside), "a finite length, 0 or more (m)");
+    return bad_conversion("band_outside", fmt::format("is {}", settings.band_outside),
+                          "a finite length, 0 or more (m)");
   if (!(settings.band_inside >= 0.0))
-    return bad("band_inside", fmt::format("is {}", settings.band_inside), "a length, 0 or more (m), or infinity");
+    return bad_conversion("band_inside", fmt::format("is {}", settings.band_inside),
+                          "a length, 0 or more (m), or infinity");
   if (no_length(settings.shell_thickness))
-    return bad("shell_thickness", fmt::format("is {}", settings.shell_thickness), "a finite length, 0 or more (m)");
+    return bad_conversion("shell_thickness", fmt::format("is {}", settings.shell_thickness),
+                          "a finite length, 0 or more (m)");
   if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
-    return bad("shell_thickness", fmt::format("is given for rule {}", to_string(settings.rule)),
-               "rule shell or automatic");
+    return bad_conversion("shell_thickness", fmt::format("is given for rule {}", to_string(settings.rule)),
+                          "rule shell or automatic");
   return success();
 }
 
@@ -190,8 +195,8 @@ class Converter {
     if (const double bytes = estimated_bytes(voxel); bytes > 2.0 * most) return too_large(bytes, most);
     Attempt attempt = planned(voxel);
     if (attempt.thickness > 0.0 && attempt.thickness < 2.0 * voxel * (1.0 - 1e-9)) {
-      return bad("shell_thickness", fmt::format("is {} m, with a voxel of {} m", attempt.thickness, voxel),
-                 fmt::format("{} m or more: two voxels", 2.0 * voxel));
+      return bad_conversion("shell_thickness", fmt::format("is {} m, with a voxel of {} m", attempt.thickness, voxel),
+                            fmt::format("{} m or more: two voxels", 2.0 * voxel));
     }
     VoxelRequest request;
     request.positions.reserve(mesh_.positions().size());
@@ -258,9 +263,9 @@ class Converter {
   }
 
   [[nodiscard]] Error too_small(double bytes) const {
-    return bad("budget",
-               fmt::format("of {} bytes is not enough for 8 voxels along the longest side", settings_.budget_bytes),
-               fmt::format("about {:.0f} bytes or more", bytes));
+    return bad_conversion(
+        "budget", fmt::format("of {} bytes is not enough for 8 voxels along the longest side", settings_.budget_bytes),
+        fmt::format("about {:.0f} bytes or more", bytes));
   }
 
   /// Signs, bands and the grid.
@@ -363,7 +368,7 @@ class Converter {
 
 Result<InsideRule> parse_inside_rule(std::string_view name) {
   if (const std::optional<InsideRule> rule = value_named<InsideRule>(name)) return *rule;
-  return bad({}, fmt::format("is \"{}\"", name), name_list<InsideRule>("\"", " or "));
+  return bad_conversion({}, fmt::format("is \"{}\"", name), name_list<InsideRule>("\"", " or "));
 }
 
 void register_mesh_voxelizer(MeshVoxelizer voxelizer) {

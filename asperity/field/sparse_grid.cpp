@@ -11,13 +11,13 @@ namespace asperity {
 
 namespace {
 
-constexpr int side = SparseBlock::side;
+constexpr int block_side = SparseBlock::side;
 constexpr int apron_side = SparseGrid::brick_side;
-constexpr int material_side = side + 1;
+constexpr int material_side = block_side + 1;
 constexpr std::size_t material_points = material_side * material_side * material_side;
 constexpr std::size_t most_table = std::size_t{1} << 27;  // 4,096 voxels a side, some 2 GB
 
-Error bad(std::string place, std::string what, std::string accepted) {
+Error bad_grid(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
@@ -29,15 +29,15 @@ constexpr std::size_t apron_index(int i, int j, int k) noexcept {
 Status check_material(const PointMaterial& m, const std::string& place) {
   const auto good = [](float value, bool fits) { return std::isnan(value) || (std::isfinite(value) && fits); };
   if (!good(m.stiffness, m.stiffness > 0.0F))
-    return bad(place + ".stiffness", fmt::format("is {}", m.stiffness), "above 0 (N/m)");
+    return bad_grid(place + ".stiffness", fmt::format("is {}", m.stiffness), "above 0 (N/m)");
   if (!good(m.damping, m.damping >= 0.0F))
-    return bad(place + ".damping", fmt::format("is {}", m.damping), "0 or more (N·s/m)");
+    return bad_grid(place + ".damping", fmt::format("is {}", m.damping), "0 or more (N·s/m)");
   if (!good(m.static_friction, m.static_friction >= 0.0F))
-    return bad(place + ".static_friction", fmt::format("is {}", m.static_friction), "0 or more");
+    return bad_grid(place + ".static_friction", fmt::format("is {}", m.static_friction), "0 or more");
   if (!good(m.dynamic_friction, m.dynamic_friction >= 0.0F))
-    return bad(place + ".dynamic_friction", fmt::format("is {}", m.dynamic_friction), "0 or more");
+    return bad_grid(place + ".dynamic_friction", fmt::format("is {}", m.dynamic_friction), "0 or more");
   if (!good(m.roughness, m.roughness >= 0.0F))
-    return bad(place + ".roughness", fmt::format("is {}", m.roughness), "0 or more");
+    return bad_grid(place + ".roughness", fmt::format("is {}", m.roughness), "0 or more");
   return success();
 }
 
@@ -45,16 +45,16 @@ Status check_block(const SparseBlock& block, std::size_t number) {
   const std::string place = fmt::format("blocks[{}]", number);
   for (const std::int32_t at : block.at) {
     if (std::abs(static_cast<std::int64_t>(at)) > (1 << 24))
-      return bad(place, fmt::format("is at {}", at), "places within 16 million blocks of the origin");
+      return bad_grid(place, fmt::format("is at {}", at), "places within 16 million blocks of the origin");
   }
   for (std::size_t i = 0; i < block.value.size(); ++i) {
     if (!std::isfinite(block.value[i]))
-      return bad(fmt::format("{}.value[{}]", place, i), "is not a finite number", "distances (m)");
+      return bad_grid(fmt::format("{}.value[{}]", place, i), "is not a finite number", "distances (m)");
   }
   if (!block.face.empty() && block.face.size() != SparseBlock::points)
-    return bad(place + ".face", fmt::format("has {} entries", block.face.size()), "512 or none");
+    return bad_grid(place + ".face", fmt::format("has {} entries", block.face.size()), "512 or none");
   if (!block.material.empty() && block.material.size() != SparseBlock::points)
-    return bad(place + ".material", fmt::format("has {} entries", block.material.size()), "512 or none");
+    return bad_grid(place + ".material", fmt::format("has {} entries", block.material.size()), "512 or none");
   for (std::size_t i = 0; i < block.material.size(); ++i)
     ASPERITY_CHECK(check_material(block.material[i], fmt::format("{}.material[{}]", place, i)));
   return success();
@@ -62,13 +62,13 @@ Status check_block(const SparseBlock& block, std::size_t number) {
 
 Status check_source(const SparseSource& source) {
   if (!(source.voxel > 0.0) || !std::isfinite(source.voxel))
-    return bad("voxel", fmt::format("is {}", source.voxel), "a length above 0 (m)");
-  if (!source.origin.allFinite()) return bad("origin", "is not finite", "three finite lengths (m)");
+    return bad_grid("voxel", fmt::format("is {}", source.voxel), "a length above 0 (m)");
+  if (!source.origin.allFinite()) return bad_grid("origin", "is not finite", "three finite lengths (m)");
   if (!(source.outside > 0.0) || !std::isfinite(source.outside))
-    return bad("outside", fmt::format("is {}", source.outside), "a length above 0 (m)");
+    return bad_grid("outside", fmt::format("is {}", source.outside), "a length above 0 (m)");
   if (!(source.inside < 0.0) || !std::isfinite(source.inside))
-    return bad("inside", fmt::format("is {}", source.inside), "a length below 0 (m)");
-  if (source.blocks.empty()) return bad("blocks", "holds none", "at least one block");
+    return bad_grid("inside", fmt::format("is {}", source.inside), "a length below 0 (m)");
+  if (source.blocks.empty()) return bad_grid("blocks", "holds none", "at least one block");
   if (source.blocks.size() > SparseGrid::most_bricks) {
     return Error{ErrorCode::too_large,
                  fmt::format("holds {} blocks", source.blocks.size()),
@@ -94,10 +94,10 @@ void SparseGrid::settle_signs(const std::vector<const SparseBlock*>& blocks) {
   std::replace(table_.begin(), table_.end(), inside_entry, open);
   const auto touching = [](const SparseBlock& block, std::size_t axis, bool low) {
     double sum = 0.0;
-    for (int b = 0; b < side; ++b) {
-      for (int a = 0; a < side; ++a) {
+    for (int b = 0; b < block_side; ++b) {
+      for (int a = 0; a < block_side; ++a) {
         int at[3] = {a, a, a};
-        at[axis] = low ? 0 : side - 1;
+        at[axis] = low ? 0 : block_side - 1;
         at[(axis + 1) % 3] = a;
         at[(axis + 2) % 3] = b;
         sum += static_cast<double>(block.value[SparseBlock::index(at[0], at[1], at[2])]);
@@ -156,17 +156,17 @@ void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::
       }
     }
     auto brick = std::make_shared<Brick>();
-    for (int k = -1; k <= side + 1; ++k) {
-      const int z = (k + side) / side;
-      for (int j = -1; j <= side + 1; ++j) {
-        const int y = (j + side) / side;
-        for (int i = -1; i <= side + 1; ++i) {
-          const int x = (i + side) / side;
+    for (int k = -1; k <= block_side + 1; ++k) {
+      const int z = (k + block_side) / block_side;
+      for (int j = -1; j <= block_side + 1; ++j) {
+        const int y = (j + block_side) / block_side;
+        for (int i = -1; i <= block_side + 1; ++i) {
+          const int x = (i + block_side) / block_side;
           const SparseBlock* from = around[z][y][x];
           brick->value[apron_index(i, j, k)] =
-              from != nullptr
-                  ? from->value[SparseBlock::index(i - (x - 1) * side, j - (y - 1) * side, k - (z - 1) * side)]
-                  : beyond[z][y][x];
+              from != nullptr ? from->value[SparseBlock::index(i - (x - 1) * block_side, j - (y - 1) * block_side,
+                                                               k - (z - 1) * block_side)]
+                              : beyond[z][y][x];
         }
       }
     }
@@ -178,10 +178,10 @@ void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::
       for (int k = 0; k < material_side; ++k) {
         for (int j = 0; j < material_side; ++j) {
           for (int i = 0; i < material_side; ++i) {
-            const SparseBlock* from = around[1 + k / side][1 + j / side][1 + i / side];
+            const SparseBlock* from = around[1 + k / block_side][1 + j / block_side][1 + i / block_side];
             if (from == nullptr || from->material.empty()) continue;
             brick->material[static_cast<std::size_t>(i + material_side * (j + material_side * k))] =
-                from->material[SparseBlock::index(i % side, j % side, k % side)];
+                from->material[SparseBlock::index(i % block_side, j % block_side, k % block_side)];
           }
         }
       }
@@ -225,7 +225,7 @@ void SparseGrid::finish() {
         for (const std::uint32_t z : {0U, 3U, 6U, 7U}) {
           for (const std::uint32_t y : {0U, 3U, 6U, 7U}) {
             for (const std::uint32_t x : {0U, 3U, 6U, 7U}) {
-              const std::uint32_t cell[3] = {side * i + x, side * j + y, side * k + z};
+              const std::uint32_t cell[3] = {block_side * i + x, block_side * j + y, block_side * k + z};
               // Rings of four nodes from these cells on cover all that the brick's cells read at its border.
               cell_samples(cell, 1, samples);
               for (const double sample : samples)
@@ -272,7 +272,7 @@ Result<SparseGrid> SparseGrid::build(SparseSource source) {
   }
   for (std::size_t a = 0; a < 3; ++a)
     grid.lower_[static_cast<int>(a)] =
-        source.origin[static_cast<int>(a)] + source.voxel * static_cast<double>(side * grid.first_[a]);
+        source.origin[static_cast<int>(a)] + source.voxel * static_cast<double>(block_side * grid.first_[a]);
   grid.table_.assign(static_cast<std::size_t>(entries), inside_entry);
   std::vector<const SparseBlock*> blocks(grid.table_.size(), nullptr);
   for (std::size_t b = 0; b < source.blocks.size(); ++b) {
@@ -281,7 +281,7 @@ Result<SparseGrid> SparseGrid::build(SparseSource source) {
                                                static_cast<std::uint32_t>(block.at[1] - grid.first_[1]),
                                                static_cast<std::uint32_t>(block.at[2] - grid.first_[2]));
     if (blocks[entry] != nullptr)
-      return bad(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
+      return bad_grid(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
     blocks[entry] = &block;
     grid.table_[entry] = static_cast<std::int32_t>(b);
   }
@@ -299,9 +299,9 @@ SparseBlock SparseGrid::block_of(std::size_t entry) const {
               first_[1] + static_cast<std::int32_t>(entry / counts_[0] % counts_[1]),
               first_[2] + static_cast<std::int32_t>(entry / counts_[0] / counts_[1])};
   if (brick.owns_material) block.material.resize(SparseBlock::points);
-  for (int k = 0; k < side; ++k) {
-    for (int j = 0; j < side; ++j) {
-      for (int i = 0; i < side; ++i) {
+  for (int k = 0; k < block_side; ++k) {
+    for (int j = 0; j < block_side; ++j) {
+      for (int i = 0; i < block_side; ++i) {
         const std::size_t at = SparseBlock::index(i, j, k);
         block.value[at] = brick.value[apron_index(i, j, k)];
         if (brick.owns_material)
@@ -351,9 +351,9 @@ Result<SparseGrid> SparseGrid::edited(std::vector<SparseBlock> changed) const {
       entry = entry * counts_[a] + static_cast<std::size_t>(here ? at : 0);
     }
     if (!here || table_[entry] < 0)
-      return bad(fmt::format("blocks[{}]", b), "is not stored in the grid", "blocks of source()");
+      return bad_grid(fmt::format("blocks[{}]", b), "is not stored in the grid", "blocks of source()");
     if (blocks[entry] != nullptr)
-      return bad(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
+      return bad_grid(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
     blocks[entry] = &block;
     around(entry, [&](std::size_t next) { wanted[next] = wanted[next] || table_[next] >= 0; });
   }

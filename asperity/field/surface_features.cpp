@@ -17,21 +17,21 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double longest = 10.0;      // m: no feature is larger
-constexpr double shortest = 1e-9;     // m: below it there are no surfaces, only atoms
-constexpr int fewest_cells = 8;       // of noise along an axis: fewer would correlate with their own repeats
-constexpr int usual_cells = 64;       // of noise whose period is not given
-constexpr int most_cells = 1 << 22;   // of noise: 16 MB
-constexpr int most_texels = 1 << 26;  // of a baked map
-constexpr int most_side = 1 << 14;    // of a baked map
+constexpr double longest = 10.0;              // m: no feature is larger
+constexpr double shortest_wave = 1e-9;        // m: below it there are no surfaces, only atoms
+constexpr int fewest_cells = 8;               // of noise along an axis: fewer would correlate with their own repeats
+constexpr int usual_cells = 64;               // of noise whose period is not given
+constexpr int most_cells = 1 << 22;           // of noise: 16 MB
+constexpr int most_feature_texels = 1 << 26;  // of a baked map
+constexpr int most_side = 1 << 14;            // of a baked map
 
-struct Kind {
+struct FeatureEntry {
   FeatureKind kind;
   std::vector<std::string> parameters;
 };
 
-const std::vector<Kind>& kinds() {
-  static const std::vector<Kind> all{
+const std::vector<FeatureEntry>& feature_table() {
+  static const std::vector<FeatureEntry> all{
       {FeatureKind::grating, {"amplitude", "wavelength", "direction", "phase"}},
       {FeatureKind::circular_grating, {"amplitude", "wavelength", "phase", "centre"}},
       {FeatureKind::grid, {"amplitude", "wavelength", "direction"}},
@@ -43,8 +43,8 @@ const std::vector<Kind>& kinds() {
   return all;
 }
 
-const Kind& kind_of(FeatureKind kind) {
-  return kinds()[std::min(static_cast<std::size_t>(kind), kinds().size() - 1)];
+const FeatureEntry& kind_of(FeatureKind kind) {
+  return feature_table()[std::min(static_cast<std::size_t>(kind), feature_table().size() - 1)];
 }
 
 bool takes(FeatureKind kind, std::string_view member) {
@@ -52,35 +52,36 @@ bool takes(FeatureKind kind, std::string_view member) {
   return std::find(all.begin(), all.end(), member) != all.end();
 }
 
-Error refusal(std::string what, std::string place, std::string accepted) {
+Error feature_refusal(std::string what, std::string place, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
 Status length_within(double value, double least, const char* place) {
   if (value >= least && value <= longest) return success();
-  return refusal(fmt::format("is {:.6g} m", value), place, fmt::format("a length of {:g} to {:g} m", least, longest));
+  return feature_refusal(fmt::format("is {:.6g} m", value), place,
+                         fmt::format("a length of {:g} to {:g} m", least, longest));
 }
 
 Status finite(double value, const char* place, const char* accepted) {
   if (std::isfinite(value) && std::abs(value) <= 1e6) return success();
-  return refusal(fmt::format("is {:.6g}", value), place, accepted);
+  return feature_refusal(fmt::format("is {:.6g}", value), place, accepted);
 }
 
 Status check_shape(const FeatureSpec& spec) {
   if (takes(spec.kind, "amplitude")) ASPERITY_CHECK(length_within(spec.amplitude, 1e-12, "amplitude"));
-  if (takes(spec.kind, "wavelength")) ASPERITY_CHECK(length_within(spec.wavelength.x(), shortest, "wavelength"));
+  if (takes(spec.kind, "wavelength")) ASPERITY_CHECK(length_within(spec.wavelength.x(), shortest_wave, "wavelength"));
   if (spec.kind == FeatureKind::grid || spec.kind == FeatureKind::map)
-    ASPERITY_CHECK(length_within(spec.wavelength.y(), shortest, "wavelength"));
+    ASPERITY_CHECK(length_within(spec.wavelength.y(), shortest_wave, "wavelength"));
   if (takes(spec.kind, "direction")) ASPERITY_CHECK(finite(spec.direction, "direction", "an angle up to 1e6 rad"));
   if (takes(spec.kind, "phase")) ASPERITY_CHECK(finite(spec.phase, "phase", "an angle up to 1e6 rad"));
   if (takes(spec.kind, "centre") && !(spec.centre.norm() <= longest)) {
-    return refusal(fmt::format("is {:.6g}, {:.6g} m", spec.centre.x(), spec.centre.y()), "centre",
-                   fmt::format("a place within {:g} m of the origin", longest));
+    return feature_refusal(fmt::format("is {:.6g}, {:.6g} m", spec.centre.x(), spec.centre.y()), "centre",
+                           fmt::format("a place within {:g} m of the origin", longest));
   }
   if (takes(spec.kind, "wall") && !(spec.wall >= 0.01 && spec.wall <= 0.5))
-    return refusal(fmt::format("is {:.6g}", spec.wall), "wall", "a share of 0.01 to 0.5 of the wavelength");
+    return feature_refusal(fmt::format("is {:.6g}", spec.wall), "wall", "a share of 0.01 to 0.5 of the wavelength");
   if (spec.kind == FeatureKind::map && spec.heights == nullptr)
-    return refusal("is not given", "heights", "a height map");
+    return feature_refusal("is not given", "heights", "a height map");
   return success();
 }
 
@@ -179,18 +180,18 @@ Result<int> cells_along(double period, double spacing) {
   if (period == 0.0) return usual_cells;
   const double cells = std::round(period / spacing);
   if (period > 0.0 && cells >= fewest_cells && cells <= most_cells) return static_cast<int>(cells);
-  return refusal(fmt::format("is {:.6g} m", period), "period",
-                 fmt::format("0, or a length of {:.4g} to {:.4g} m with this correlation length",
-                             fewest_cells * spacing, spacing * most_cells));
+  return feature_refusal(fmt::format("is {:.6g} m", period), "period",
+                         fmt::format("0, or a length of {:.4g} to {:.4g} m with this correlation length",
+                                     fewest_cells * spacing, spacing * most_cells));
 }
 
 /// Cubic B-spline over the four coefficients around a place `t` (0 to 1) between the middle two.
-struct SplineWeights {
+struct FeatureWeights {
   double value[4];
   double slope[4];
 };
 
-SplineWeights spline_weights(double t) noexcept {
+FeatureWeights spline_weights(double t) noexcept {
   const double s = 1.0 - t;
   const double tt = t * t;
   const double ss = s * s;
@@ -203,7 +204,7 @@ SplineWeights spline_weights(double t) noexcept {
 
 Status SurfaceFeature::prepare_noise() {
   ASPERITY_CHECK(length_within(spec_.roughness, 1e-12, "roughness"));
-  ASPERITY_CHECK(length_within(spec_.correlation_length, shortest, "correlation_length"));
+  ASPERITY_CHECK(length_within(spec_.correlation_length, shortest_wave, "correlation_length"));
   const double spacing = spec_.correlation_length / correlation_cells;
   ASPERITY_TRY(columns_, cells_along(spec_.period.x(), spacing));
   ASPERITY_TRY(rows_, cells_along(spec_.period.y(), spacing));
@@ -240,8 +241,8 @@ Status SurfaceFeature::prepare_noise() {
 }
 
 Result<SurfaceFeature> SurfaceFeature::build(const FeatureSpec& spec) {
-  if (static_cast<std::size_t>(spec.kind) >= kinds().size())
-    return refusal("is unknown", "kind", name_list<FeatureKind>());
+  if (static_cast<std::size_t>(spec.kind) >= feature_table().size())
+    return feature_refusal("is unknown", "kind", name_list<FeatureKind>());
   ASPERITY_CHECK(check_shape(spec));
   SurfaceFeature feature;
   feature.spec_ = spec;
@@ -290,8 +291,8 @@ FeatureSample SurfaceFeature::sample_ridges(double along) const noexcept {
 FeatureSample SurfaceFeature::sample_noise(const Vec2& uv) const noexcept {
   const TexelPlace u = texel_under(unit_coordinate(uv.x() * per_repeat_.x(), Wrap::repeat), columns_);
   const TexelPlace v = texel_under(unit_coordinate(uv.y() * per_repeat_.y(), Wrap::repeat), rows_);
-  const SplineWeights along_u = spline_weights(u.offset + 0.5);
-  const SplineWeights along_v = spline_weights(v.offset + 0.5);
+  const FeatureWeights along_u = spline_weights(u.offset + 0.5);
+  const FeatureWeights along_v = spline_weights(v.offset + 0.5);
   const auto stride = static_cast<std::size_t>(columns_ + 3);
   const float* row = lattice_->data() + static_cast<std::size_t>(v.index) * stride + static_cast<std::size_t>(u.index);
   // Along v first: four columns at a time fit the processor's registers.
@@ -384,8 +385,9 @@ const std::vector<std::string>& feature_names() {
 Result<FeatureKind> feature_by_name(std::string_view name) {
   if (const std::optional<FeatureKind> kind = value_named<FeatureKind>(name)) return *kind;
   const std::string near = nearest_name(name, feature_names());
-  return refusal(fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)),
-                 "kind", name_list<FeatureKind>());
+  return feature_refusal(
+      fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)), "kind",
+      name_list<FeatureKind>());
 }
 
 const std::vector<std::string>& feature_parameters(FeatureKind kind) {
@@ -412,18 +414,18 @@ Result<HeightMap> bake(const std::vector<SurfaceFeature>& features, const Vec2& 
                        int rows, Wrap wrap) {
   const Vec2 extent = upper - lower;
   if (!lower.allFinite() || !extent.allFinite() || !(extent.minCoeff() > 0.0)) {
-    return refusal(
+    return feature_refusal(
         fmt::format("runs from {:.6g}, {:.6g} to {:.6g}, {:.6g} m", lower.x(), lower.y(), upper.x(), upper.y()),
         "rectangle", "an upper corner above and to the right of the lower one");
   }
   if (columns < 1 || rows < 1)
-    return refusal(fmt::format("is {} x {}", columns, rows), "texels", "1 or more along each axis");
-  if (columns > most_side || rows > most_side || std::int64_t{columns} * rows > most_texels) {
+    return feature_refusal(fmt::format("is {} x {}", columns, rows), "texels", "1 or more along each axis");
+  if (columns > most_side || rows > most_side || std::int64_t{columns} * rows > most_feature_texels) {
     return Error{ErrorCode::too_large,
                  fmt::format("is {} x {}", columns, rows),
                  {},
                  "texels",
-                 fmt::format("at most {} along each axis and {} in all", most_side, most_texels)};
+                 fmt::format("at most {} along each axis and {} in all", most_side, most_feature_texels)};
   }
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));

@@ -13,15 +13,15 @@
 namespace asperity {
 namespace {
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
+constexpr double whole_turn = 2.0 * std::numbers::pi;
 constexpr std::size_t most_numbers = std::size_t{1} << 28U;  // 1 GB of floats
 constexpr std::uint32_t most_nodes = 4096;
 
-struct Kind {
+struct VolumeEntry {
   VolumeKind kind;
   std::array<std::string_view, 5> parameters;  // as many as are not empty
 };
-constexpr std::array<Kind, 6> kinds{{
+constexpr std::array<VolumeEntry, 6> volume_table{{
     {VolumeKind::cavity, {"speed", "strength", "thickness", "wavelength", "time"}},
     {VolumeKind::sphere, {"radius"}},
     {VolumeKind::shells, {"count", "thickness", "wavelength"}},
@@ -61,7 +61,7 @@ Result<GridAxis> spread(std::uint32_t count, double length, double ratio, Cluste
   return GridAxis::build(std::move(nodes));
 }
 
-double shortest(const Vec3& extent) {
+double shortest_edge(const Vec3& extent) {
   return extent.minCoeff();
 }
 
@@ -139,7 +139,7 @@ Status check_kind(const VolumeGenerator& g) {
 }  // namespace
 
 std::span<const std::string_view> parameters_of(VolumeKind kind) {
-  for (const Kind& entry : kinds) {
+  for (const VolumeEntry& entry : volume_table) {
     if (entry.kind != kind) continue;
     const auto end = std::find(entry.parameters.begin(), entry.parameters.end(), std::string_view());
     return {entry.parameters.begin(), end};
@@ -159,7 +159,7 @@ VolumeGenerator completed(VolumeGenerator g) {
     g.size = cavity ? std::array<std::uint32_t, 3>{259, 127, 128} : std::array<std::uint32_t, 3>{128, 128, 128};
   if (!g.extent) g.extent = cavity ? Vec3(0.2, 0.1, 0.1) : Vec3(0.1, 0.1, 0.1);
   if (!g.stretch) g.stretch = cavity ? 6.0 : 1.0;
-  const double side = shortest(*g.extent);
+  const double side = shortest_edge(*g.extent);
   if (!g.radius) g.radius = 0.35 * side;
   if (!g.wavelength) {
     switch (g.kind) {
@@ -266,9 +266,9 @@ double VolumeFunction::value(const Vec3& p) const noexcept {
       const double linear = g.gradient * (p.z() - centre_.z());
       return *g.amplitude > 0.0 ? *g.amplitude * std::tanh(linear / *g.amplitude) : linear;
     }
-    case VolumeKind::waves: return p.z() - centre_.z() - *g.amplitude * std::sin(two_pi * p.x() / *g.wavelength);
+    case VolumeKind::waves: return p.z() - centre_.z() - *g.amplitude * std::sin(whole_turn * p.x() / *g.wavelength);
     case VolumeKind::gyroid: {
-      const Vec3 a = p * (two_pi / *g.wavelength);
+      const Vec3 a = p * (whole_turn / *g.wavelength);
       return std::sin(a.x()) * std::cos(a.y()) + std::sin(a.y()) * std::cos(a.z()) + std::sin(a.z()) * std::cos(a.x());
     }
     case VolumeKind::cavity: break;
@@ -292,7 +292,7 @@ void VolumeFunction::row(const GridAxis& x, double y, double z, float* out) cons
 }
 
 void VolumeFunction::gyroid_slab(const GridAxes& axes, std::uint32_t first, std::uint32_t last, float* out) const {
-  const double k = two_pi / *generator_.wavelength;
+  const double k = whole_turn / *generator_.wavelength;
   std::array<std::vector<double>, 3> sine;
   std::array<std::vector<double>, 3> cosine;
   for (std::size_t a = 0; a < 3; ++a) {

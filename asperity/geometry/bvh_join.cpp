@@ -11,13 +11,13 @@ namespace {
 
 #define ASPERITY_INLINE [[gnu::always_inline]] inline
 
-struct FloatBox {
+struct JoinedBox {
   float lower[3];
   float upper[3];
 };
 
 /// Which of the eight boxes meet `box`: not zero for those that do. Answers whether any does.
-ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const FloatBox& box, std::int32_t (&met)[8]) {
+ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const JoinedBox& box, std::int32_t (&met)[8]) {
   using Floats = float __attribute__((vector_size(32)));
   using Ints = std::int32_t __attribute__((vector_size(32)));
   Ints all = Ints{} - 1;
@@ -34,8 +34,8 @@ ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const FloatBox& box, std::in
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-FloatBox around(const BoxesOf8& boxes) {
-  FloatBox all{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
+JoinedBox around(const BoxesOf8& boxes) {
+  JoinedBox all{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
   for (int axis = 0; axis < 3; ++axis) {
     for (int i = 0; i < 8; ++i) {
       all.lower[axis] = std::min(all.lower[axis], boxes.lower[axis][i]);
@@ -45,7 +45,7 @@ FloatBox around(const BoxesOf8& boxes) {
   return all;
 }
 
-void put(const FloatBox& box, BoxesOf8& boxes, std::size_t i) {
+void put(const JoinedBox& box, BoxesOf8& boxes, std::size_t i) {
   for (int axis = 0; axis < 3; ++axis) {
     boxes.lower[axis][i] = box.lower[axis];
     boxes.upper[axis][i] = box.upper[axis];
@@ -57,7 +57,7 @@ void put(const FloatBox& box, BoxesOf8& boxes, std::size_t i) {
 class Bvh::Join {
  public:
   Join(const Bvh& bvh, std::span<const Box> boxes) : bvh_(bvh), leaves_(bvh.leaves_.size()), nodes_(bvh.nodes_.size()) {
-    constexpr FloatBox nothing{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
+    constexpr JoinedBox nothing{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
     for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
       for (std::size_t i = 0; i < 8; ++i) {
         const std::uint32_t face = bvh.leaves_[leaf].face[i];
@@ -76,7 +76,7 @@ class Bvh::Join {
 
   ASPERITY_INLINE void run(const MeetingVisit& visit) const {
     for (std::uint32_t leaf = 0; leaf < leaves_.size(); ++leaf) {
-      const FloatBox whole = around(leaves_[leaf]);
+      const JoinedBox whole = around(leaves_[leaf]);
       std::uint32_t stack[stack_capacity];
       int top = 0;
       stack[top++] = 0;
@@ -105,8 +105,8 @@ class Bvh::Join {
 
  private:
   /// In the hierarchy's own units, grown by more than their rounding.
-  [[nodiscard]] FloatBox local(const Box& box) const {
-    FloatBox grown;
+  [[nodiscard]] JoinedBox local(const Box& box) const {
+    JoinedBox grown;
     bvh_.to_local(box.lower, grown.lower);
     bvh_.to_local(box.upper, grown.upper);
     for (int axis = 0; axis < 3; ++axis) {
@@ -121,8 +121,8 @@ class Bvh::Join {
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint32_t face = bvh_.leaves_[one].face[i];
       if (face == no_index) continue;
-      const FloatBox box{{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
-                         {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
+      const JoinedBox box{{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
+                          {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
       std::int32_t met[8];
       if (!meeting(leaves_[other], box, met)) continue;
       for (std::size_t j = one == other ? i + 1 : 0; j < 8; ++j) {

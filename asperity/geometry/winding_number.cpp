@@ -7,7 +7,7 @@
 namespace asperity {
 namespace {
 
-constexpr std::uint32_t leaf_size = 8;
+constexpr std::uint32_t winding_leaf_size = 8;
 
 /// Area-weighted moments of a cluster's normals about its centre c: the integrals of n, n (x - c) and
 /// n (x - c)(x - c) / 2, which the derivatives of the solid angle's kernel are contracted with.
@@ -130,7 +130,7 @@ class WindingNumber::Builder {
       tree_.faces_[face] = face;
       centroids_[face] = (a + b + c) / 3.0;
     }
-    tree_.nodes_.reserve(4 * std::size_t{count} / leaf_size + 1);
+    tree_.nodes_.reserve(4 * std::size_t{count} / winding_leaf_size + 1);
     if (count > 0) add(0, count);
     tree_.nodes_.shrink_to_fit();
   }
@@ -141,7 +141,7 @@ class WindingNumber::Builder {
     const std::size_t node = tree_.nodes_.size();
     tree_.nodes_.emplace_back();
     Moments moments;
-    if (end - begin <= leaf_size) {
+    if (end - begin <= winding_leaf_size) {
       moments = moments_about(mesh_, tree_.faces_.data() + begin, tree_.faces_.data() + end);
       tree_.nodes_[node].first = begin;
       tree_.nodes_[node].count = end - begin;

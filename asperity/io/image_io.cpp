@@ -48,10 +48,10 @@ namespace asperity {
 namespace {
 
 constexpr const char* accepted_images = "a PNG (8 or 16 bits, any kind) or a JPEG";
-constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 31U;
+constexpr std::uintmax_t largest_image_file = std::uintmax_t{1} << 31U;
 /// Deflate shrinks at most 1032 times; JPEG spends at least one bit on each block of 64 pixels. A header that promises
 /// more than this many samples a byte promises what the file cannot hold, and is refused before allocating.
-constexpr std::size_t most_pixels_a_byte = 1100 * 8;
+constexpr std::size_t most_image_pixels_a_byte = 1100 * 8;
 
 Error image_error(ErrorCode code, std::string what, const std::string& name, std::string place = "") {
   return Error{code, std::move(what), name, std::move(place), accepted_images};
@@ -67,7 +67,7 @@ Status check_size(std::uint64_t width, std::uint64_t height, std::size_t bytes, 
     error.accepted = fmt::format("at most {} pixels", max_pixels);
     return error;
   }
-  if (width * height / most_pixels_a_byte > bytes) {
+  if (width * height / most_image_pixels_a_byte > bytes) {
     return image_error(ErrorCode::file_truncated,
                        fmt::format("{} x {} pixels cannot be in {} bytes", width, height, bytes), name);
   }
@@ -347,7 +347,7 @@ Result<std::string> read_bytes(const std::filesystem::path& path) {
   if (!std::filesystem::exists(status)) return image_error(ErrorCode::file_missing, "there is no such file", name);
   if (std::filesystem::is_directory(status))
     return image_error(ErrorCode::file_missing, "is a folder, not a file", name);
-  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, failure) > largest_file) {
+  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, failure) > largest_image_file) {
     return image_error(ErrorCode::too_large, "the file has more than 2 GiB", name);
   }
   std::ifstream stream(path, std::ios::binary);

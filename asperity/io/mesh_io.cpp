@@ -13,7 +13,7 @@
 namespace asperity {
 namespace {
 
-constexpr std::uintmax_t largest_file = std::uintmax_t{4} << 30U;
+constexpr std::uintmax_t largest_mesh_file = std::uintmax_t{4} << 30U;
 constexpr const char* accepted_formats = "an OBJ, PLY, STL or glTF file";
 
 std::string lower_extension(const std::string& name) {
@@ -60,7 +60,7 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   const std::uintmax_t size = std::filesystem::file_size(path, problem);
   std::ifstream stream(path, std::ios::binary);
   if (problem || !stream) return missing(path, "cannot be opened for reading");
-  if (size > largest_file) {
+  if (size > largest_mesh_file) {
     return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), path.string(), {}, "files up to 4 GiB"};
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
@@ -70,7 +70,8 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 }
 
 /// `folder`: where other files that the mesh file names are looked for; null: nowhere.
-Result<MeshSource> read_named(std::string_view bytes, const std::string& name, const std::filesystem::path* folder) {
+Result<MeshSource> read_named_mesh(std::string_view bytes, const std::string& name,
+                                   const std::filesystem::path* folder) {
   try {
     Result<MeshSource> source = read_by_format(bytes, name, folder);
     if (source) return source;
@@ -143,14 +144,14 @@ std::string_view take_word(std::string_view& line) {
 }  // namespace mesh_readers
 
 Result<MeshSource> read_mesh_bytes(std::string_view bytes, const std::string& name) {
-  return read_named(bytes, name, nullptr);
+  return read_named_mesh(bytes, name, nullptr);
 }
 
 Result<MeshSource> read_mesh(const std::filesystem::path& path) {
   try {
     ASPERITY_TRY(const std::string bytes, read_file(path));
     const std::filesystem::path folder = path.parent_path();
-    return read_named(bytes, path.string(), &folder);
+    return read_named_mesh(bytes, path.string(), &folder);
   } catch (const std::exception& problem) {
     return missing(path, fmt::format("cannot be read ({})", problem.what()));
   }

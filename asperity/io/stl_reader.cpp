@@ -12,13 +12,6 @@ constexpr std::size_t header_size = 80;
 constexpr std::size_t first_record = 84;
 constexpr std::size_t record_size = 50;
 
-/// Reads a little-endian 32-bit pattern; `at` + 4 must lie within `bytes`.
-std::uint32_t bits_at(std::string_view bytes, std::size_t at) {
-  std::uint32_t bits = 0;
-  for (std::size_t i = 4; i-- > 0;) bits = (bits << 8U) | static_cast<std::uint8_t>(bytes[at + i]);
-  return bits;
-}
-
 Result<MeshSource> read_binary(std::string_view bytes) {
   const std::size_t count = bits_at(bytes, header_size);
   const std::size_t wanted = first_record + count * record_size;

@@ -21,7 +21,7 @@ using Bytes = std::vector<std::byte>;
 using Json = nlohmann::json;
 
 constexpr std::string_view magic = "ASPTRACE";
-constexpr std::uint32_t format_version = 1;
+constexpr std::uint32_t trace_format_version = 1;
 // The level of volumes shares four bytes with the flags: traces from before there were volumes have it 0.
 constexpr unsigned level_shift = 24;
 constexpr std::uint32_t byte_order_mark = 0x01020304U;
@@ -160,7 +160,7 @@ Bytes encode_header(const std::string& metadata) {
   Bytes bytes;
   for (const std::byte b : as_bytes_of(magic)) bytes.push_back(b);
   Encoder encoder(bytes);
-  encoder.field(format_version);
+  encoder.field(trace_format_version);
   encoder.field(byte_order_mark);
   encoder.field(record_bytes());
   encoder.field(static_cast<std::uint32_t>(metadata.size()));
@@ -491,10 +491,10 @@ Result<std::size_t> check_header(std::span<const std::byte> bytes) {
   if (u32_at(bytes, 12) != byte_order_mark) {
     return refuse(ErrorCode::file_unsupported, "has another byte order, or its header is damaged", 12, "little-endian");
   }
-  if (const std::uint32_t version = u32_at(bytes, 8); version != format_version) {
+  if (const std::uint32_t version = u32_at(bytes, 8); version != trace_format_version) {
     return refuse(ErrorCode::file_unsupported,
                   fmt::format("has version {} of the trace format, or its header is damaged", version), 8,
-                  fmt::format("version {}", format_version));
+                  fmt::format("version {}", trace_format_version));
   }
   const std::uint32_t length = u32_at(bytes, 20);
   if (length > max_metadata) {

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* accepted_formats =
+constexpr const char* accepted_volume_formats =
     "a volume: .json (sidecar) or .raw, .vtk, .vti, .vtr, .vts, .vtu, .pvti, .pvtr, .nrrd, .nhdr, .foam";
 
 std::atomic<VolumeReader>& registered() {
@@ -62,7 +62,8 @@ Result<fs::path> sidecar_of(const fs::path& raw) {
 Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
-  if (!fs::exists(status)) return Error{ErrorCode::file_missing, "no such file", path.string(), {}, accepted_formats};
+  if (!fs::exists(status))
+    return Error{ErrorCode::file_missing, "no such file", path.string(), {}, accepted_volume_formats};
   if (needs_volume_reader(path)) {
     const VolumeReader reader = registered();
     if (reader == nullptr) {
@@ -75,7 +76,8 @@ Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& req
     return reader(path, request, progress);
   }
   if (fs::is_directory(status)) {
-    return Error{ErrorCode::file_missing, "is a folder, and no OpenFOAM case", path.string(), {}, accepted_formats};
+    return Error{
+        ErrorCode::file_missing, "is a folder, and no OpenFOAM case", path.string(), {}, accepted_volume_formats};
   }
   const std::string suffix = lower_suffix(path);
   if (suffix == ".json") return read_sidecar_volume(path, request, progress);
@@ -84,7 +86,7 @@ Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& req
     return read_sidecar_volume(sidecar, request, progress);
   }
   return Error{
-      ErrorCode::file_unsupported, "is no volume format that is read here", path.string(), {}, accepted_formats};
+      ErrorCode::file_unsupported, "is no volume format that is read here", path.string(), {}, accepted_volume_formats};
 }
 
 }  // namespace
@@ -131,7 +133,7 @@ Result<VolumeSource> read_volume(const fs::path& path, const VolumeRequest& requ
                  fmt::format("cannot be read ({})", failure.what()),
                  path.string(),
                  {},
-                 accepted_formats};
+                 accepted_volume_formats};
   }
 }
 

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using volume_assembly::RawVolume;
 
-constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
+constexpr std::array<const char*, 3> sidecar_axis_names{"x", "y", "z"};
 constexpr std::uint64_t most_nodes = 1U << 20U;  // along an axis: 1e6 nodes of 8 bytes, before any sample is looked at
 
 const std::vector<std::string> sidecar_keys{"asperity_volume", "file", "size",       "type",  "byte_order",  "origin",
@@ -83,8 +83,8 @@ Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, 
     }
     const auto read = number.get<double>();
     if (!std::isfinite(read) || (above_zero && !(read > 0.0))) {
-      reader.fail(
-          Error{ErrorCode::bad_value, fmt::format("is {:g} (axis {})", read, axis_names[a]), {}, place, accepted});
+      reader.fail(Error{
+          ErrorCode::bad_value, fmt::format("is {:g} (axis {})", read, sidecar_axis_names[a]), {}, place, accepted});
       return fallback;
     }
     numbers[static_cast<int>(a)] = read;
@@ -124,11 +124,12 @@ void read_places(ObjectReader& reader, Sidecar& sidecar) {
   static const std::vector<std::string> keys{"x", "y", "z"};
   ObjectReader axes_reader(*axes, reader.place_of("axes"), "sidecar's axes", keys);
   for (std::size_t a = 0; a < 3 && !axes_reader.failed(); ++a) {
-    const SceneJson* axis = axes_reader.raw(axis_names[a]);
+    const SceneJson* axis = axes_reader.raw(sidecar_axis_names[a]);
     if (axis == nullptr) {
-      axes_reader.fail(axis_names[a], "is missing", "an array of coordinates");
+      axes_reader.fail(sidecar_axis_names[a], "is missing", "an array of coordinates");
     } else {
-      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(axis_names[a]), sidecar.raw.nodes[a]);
+      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(sidecar_axis_names[a]),
+                sidecar.raw.nodes[a]);
     }
   }
   reader.take("axes", std::move(axes_reader));

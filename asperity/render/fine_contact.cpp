@@ -309,7 +309,7 @@ bool resists(const Instance& instance, const Material& material) noexcept {
 }
 
 /// What was given stays on the book: a debt is not forgotten by lifting off.
-void let_go(ContactState& slot) noexcept {
+void leave_fine_contact(ContactState& slot) noexcept {
   slot.friction = {};
   slot.texture.held = false;
   slot.texture.force = Vec3::Zero();
@@ -335,7 +335,7 @@ bool adds_friction(const Instance& instance) noexcept {
 bool add_fine_forces(const Instance& instance, const Material& material, bool friction, double stiffness,
                      const FineMotion& motion, ContactState& slot, EnergyTank& tank, LawForce& law) noexcept {
   if (!law.contact || !(law.push > 0.0)) {
-    let_go(slot);
+    leave_fine_contact(slot);
     return false;
   }
   MappedPlaces places;

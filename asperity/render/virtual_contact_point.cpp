@@ -17,7 +17,7 @@ double friction_of(const Material& material, double depth_gain, double depth) no
   return std::min(most_friction, material.dynamic_friction * (1.0 + depth_gain * depth));
 }
 
-void let_go(ContactState& state) noexcept {
+void leave_contact_point(ContactState& state) noexcept {
   state.iso.crossed = false;
   state.iso.value = 0.0;
   state.iso.normal = Vec3::Zero();
@@ -108,7 +108,7 @@ LawForce printed_push(const ImplicitSurface& surface, ContactMagnitude magnitude
                       ContactState& state) noexcept {
   const PrintedContact contact = printed_contact(surface, magnitude, offset, here, probe, state.hint.sparse);
   if (!contact.found) {
-    let_go(state);
+    leave_contact_point(state);
     return {};
   }
   Vec3 point = probe + contact.depth * contact.direction;
@@ -131,7 +131,7 @@ LawForce printed_push(const ImplicitSurface& surface, ContactMagnitude magnitude
 
 LawForce printed_pull(const ImplicitSurface& surface, const Potential& here, const Material& own, const Vec3& probe,
                       const Vec3& velocity, ContactState& state) noexcept {
-  let_go(state);
+  leave_contact_point(state);
   const double slope = here.gradient.norm();
   if (!(slope > 0.0)) return {};
   const double f = here.value - surface.offset();
@@ -378,7 +378,7 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   const bool outside = !known || here.value >= 0.0;
   state.seen_outside = state.seen_outside || outside;
   if (!known || !state.seen_outside || (outside && !(here.value < rule.band))) {
-    let_go(state);
+    leave_contact_point(state);
     state.iso.previous = probe;
     return {};
   }
@@ -404,7 +404,7 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   state.iso.previous = probe;
   if (!held) {
     // Nobody knows the way out: felt again after having been outside.
-    let_go(state);
+    leave_contact_point(state);
     state.seen_outside = false;
     return {};
   }
@@ -440,7 +440,7 @@ LawForce virtual_contact_force(const VirtualContactPointLaw& law, const Implicit
   const Potential here = surface.grid().node_gradients(probe, state.hint.sparse);
   if (here.value - surface.offset() >= law.offset) {
     state.seen_outside = true;
-    let_go(state);
+    leave_contact_point(state);
     return {};
   }
   return printed_push(surface, law.magnitude, law.offset, law.depth_gain, here, material, probe, velocity, state);
@@ -457,7 +457,7 @@ LawForce magnetic_force(const MagneticLaw& law, const ImplicitSurface& surface, 
   if (f >= 0.0) {
     state.seen_outside = true;
     if (f < law.band) return printed_pull(surface, here, material, probe, velocity, state);
-    let_go(state);
+    leave_contact_point(state);
     return {};
   }
   return printed_push(surface, ContactMagnitude::distance, 0.0, 0.0, here, material, probe, velocity, state);

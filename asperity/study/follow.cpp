@@ -13,7 +13,7 @@
 namespace asperity {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_reading = std::numeric_limits<double>::quiet_NaN();
 
 Error bad(double value, std::string place, const char* accepted) {
   return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, std::move(place), accepted};
@@ -103,7 +103,7 @@ double follow_error(const IsoSurface& surface, const Vec3& p, IsoHint& hint) noe
   FieldJet jet;
   const double largest = largest_deviation(surface);
   if (!p.allFinite() || !(largest > 0.0) || !surface.field().contains(p) || !surface.view().sample(p, hint, jet))
-    return nan;
+    return no_reading;
   // Between its samples a smooth field reaches a little beyond them.
   return std::min(1.0, std::abs(jet.value - surface.threshold()) / largest);
 }
@@ -130,7 +130,7 @@ FollowMetrics measure_follow(std::span<const double> errors, std::span<const Vec
     length += way;
   }
   if (m.samples == 0) {
-    m.mean = m.min = m.max = m.global = nan;
+    m.mean = m.min = m.max = m.global = no_reading;
     return m;
   }
   m.mean = sum / static_cast<double>(m.samples);

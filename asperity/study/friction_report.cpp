@@ -10,24 +10,21 @@
 
 #include "asperity/io/atomic_file.h"
 #include "asperity/study/detail/page.h"
+#include "asperity/study/detail/page_data.h"
 
 namespace asperity {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t friction_script = 4;  // of report_assets()
-constexpr std::size_t most_rows = 1500;     // of a plot
+constexpr std::size_t friction_script = 4;        // of report_assets()
+constexpr std::size_t most_friction_rows = 1500;  // of a plot
 
 const std::vector<std::string>& shown_parameters() {
   static const std::vector<std::string> names{"mass",           "load",     "static_friction", "dynamic_friction",
                                               "stiffness",      "damping",  "viscosity",       "stick_speed",
                                               "stribeck_speed", "exponent", "adhesion"};
   return names;
-}
-
-json significant(double value) {
-  return std::isfinite(value) ? json(std::stod(fmt::format("{:.5g}", value))) : json(nullptr);
 }
 
 /// Where a filtered trace first rises through its mean after a fall below it: measured and predicted begin alike.
@@ -48,7 +45,7 @@ json rows_of(const FrictionTrace& measured, const TraceComparison& comparison, c
   const std::size_t p0 = first_rise(p, comparison.predicted.level, comparison.measured.threshold);
   const double length = static_cast<double>(p.size() - p0) * comparison.prediction.spacing;
   const auto samples = std::min(y.size() - y0, static_cast<std::size_t>(length / measured.spacing));
-  const std::size_t stride = std::max<std::size_t>(1, samples / most_rows);
+  const std::size_t stride = std::max<std::size_t>(1, samples / most_friction_rows);
   json rows = json::array();
   for (std::size_t i = 0; i < samples; i += stride) {
     const double time = static_cast<double>(i) * measured.spacing;

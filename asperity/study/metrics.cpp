@@ -8,7 +8,7 @@
 namespace asperity {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 constexpr double bins_per_decade = 10.0;
 constexpr double fastest_bin = 1e-8;  // s; the histogram's first edge at the lowest
 
@@ -37,7 +37,7 @@ TickMetrics measure_ticks(std::span<const TraceRecord> records, const RunSeries&
 
 ForceMetrics measure_force(std::span<const TraceRecord> records, const RunSeries& series) {
   ForceMetrics m;
-  m.jump_distance = nan;
+  m.jump_distance = not_measured;
   double squares = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -112,8 +112,8 @@ HeightMetrics measure_height(const RunSeries& series) {
   }
   m.amplitude = relief.size();
   m.excursion = followed.size();
-  m.rms_error = m.samples > 0 ? std::sqrt(squares / static_cast<double>(m.samples)) : nan;
-  m.relative_error = m.amplitude > 0.0 ? m.rms_error / m.amplitude : nan;
+  m.rms_error = m.samples > 0 ? std::sqrt(squares / static_cast<double>(m.samples)) : not_measured;
+  m.relative_error = m.amplitude > 0.0 ? m.rms_error / m.amplitude : not_measured;
   return m;
 }
 
@@ -171,11 +171,11 @@ class OverDistance {
   }
   /// Straight between ticks. The stroke's ends lie between ticks as well: lines go on for one tick and a half beyond.
   [[nodiscard]] double at(double distance) const {
-    if (x_.size() < 2) return nan;
+    if (x_.size() < 2) return not_measured;
     const auto above = std::upper_bound(x_.begin() + 1, x_.end() - 1, distance);
     const auto i = static_cast<std::size_t>(above - x_.begin());
     const double u = (distance - x_[i - 1]) / (x_[i] - x_[i - 1]);
-    return u >= -1.5 && u <= 2.5 ? y_[i - 1] + u * (y_[i] - y_[i - 1]) : nan;
+    return u >= -1.5 && u <= 2.5 ? y_[i - 1] + u * (y_[i] - y_[i - 1]) : not_measured;
   }
 
  private:
@@ -194,7 +194,7 @@ double loop_length(const StrokePath& path, double travelled) {
 EnergyMetrics measure_energy(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path,
                              double travelled) {
   EnergyMetrics m;
-  m.mean_loop = nan;
+  m.mean_loop = not_measured;
   if (records.empty()) return m;
   std::vector<double> total(series.size());
   double lowest = infinity;
@@ -271,7 +271,7 @@ double percentile(std::span<const double> values, double p) {
   for (const double value : values) {
     if (std::isfinite(value)) finite.push_back(value);
   }
-  if (finite.empty()) return nan;
+  if (finite.empty()) return not_measured;
   const double rank = std::ceil(std::clamp(p, 0.0, 1.0) * static_cast<double>(finite.size()));
   const std::size_t index = rank < 1.0 ? 0 : std::min(finite.size() - 1, static_cast<std::size_t>(rank) - 1);
   std::nth_element(finite.begin(), finite.begin() + static_cast<std::ptrdiff_t>(index), finite.end());

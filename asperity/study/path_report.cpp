@@ -9,19 +9,16 @@
 #include "asperity/core/units.h"
 #include "asperity/io/atomic_file.h"
 #include "asperity/study/detail/page.h"
+#include "asperity/study/detail/page_data.h"
 
 namespace asperity {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t path_script = 5;   // of report_assets()
-constexpr std::size_t most_rows = 2000;  // of a plot
-constexpr double degrees = 57.29577951308232;
-
-json significant(double value) {
-  return std::isfinite(value) ? json(std::stod(fmt::format("{:.5g}", value))) : json(nullptr);
-}
+constexpr std::size_t path_script = 5;        // of report_assets()
+constexpr std::size_t most_path_rows = 2000;  // of a plot
+constexpr double degrees_a_radian = 57.29577951308232;
 
 std::string words(double value, const char* format) {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : std::string("–");
@@ -34,9 +31,9 @@ json table_row(const PathScore& score) {
           words(100.0 * e.relative, "{:.3g}"),
           words(e.largest_error, "{:.4g}"),
           words(e.peak_rendered - e.peak_measured, "{:+.3g}"),
-          words(e.mean_angle * degrees, "{:.3g}"),
-          words(e.largest_angle * degrees, "{:.3g}"),
-          score.normal.samples > 0 ? words(score.normal.mean * degrees, "{:.3g}") : std::string("–"),
+          words(e.mean_angle * degrees_a_radian, "{:.3g}"),
+          words(e.largest_angle * degrees_a_radian, "{:.3g}"),
+          score.normal.samples > 0 ? words(score.normal.mean * degrees_a_radian, "{:.3g}") : std::string("–"),
           words(100.0 * e.missed, "{:.3g}"),
           words(100.0 * e.added, "{:.3g}"),
           words(1e3 * score.mean_penetration, "{:.3g}"),
@@ -47,7 +44,7 @@ json table_row(const PathScore& score) {
 template <class Value>
 json rows_of(const PathReport& report, const Value& value) {
   const std::vector<double> distance = distance_along(report.path);
-  const std::size_t stride = std::max<std::size_t>(1, (distance.size() + most_rows - 1) / most_rows);
+  const std::size_t stride = std::max<std::size_t>(1, (distance.size() + most_path_rows - 1) / most_path_rows);
   json rows = json::array();
   for (std::size_t i = 0; i < distance.size(); i += stride) {
     json row{significant(1e3 * distance[i])};
@@ -86,7 +83,7 @@ json page_data_of(const PathReport& report) {
     for (const PathScore& score : report.scores) row.push_back(significant(score.force.error[i]));
   });
   const json angle = rows_of(report, [&](std::size_t i, json& row) {
-    for (const PathScore& score : report.scores) row.push_back(significant(score.force.angle[i] * degrees));
+    for (const PathScore& score : report.scores) row.push_back(significant(score.force.angle[i] * degrees_a_radian));
   });
   return {{"title", report.origin.title},
           {"command", report.origin.command},
@@ -113,7 +110,8 @@ std::string verdict(const PathScore& score) {
   if (e.compared == 0) return "neither measured nor rendered a force";
   std::string text = fmt::format("its force is off by {:.3g} N", e.rms_error);
   if (std::isfinite(e.relative)) text += fmt::format(" ({:.2g} %)", 100.0 * e.relative);
-  if (std::isfinite(e.mean_angle)) text += fmt::format(", its direction by {:.2g} degrees", e.mean_angle * degrees);
+  if (std::isfinite(e.mean_angle))
+    text += fmt::format(", its direction by {:.2g} degrees", e.mean_angle * degrees_a_radian);
   if (e.missed > 0.0) text += fmt::format("; it misses {:.2g} % of the contact", 100.0 * e.missed);
   if (e.added > 0.0) text += fmt::format("; it adds contact on {:.2g} % of the free path", 100.0 * e.added);
   return text;

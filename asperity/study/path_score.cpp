@@ -23,10 +23,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double least_force = 1e-3;  // N: weaker ones have no direction worth comparing
-constexpr std::uintmax_t largest_file = 256U << 20U;
-constexpr double most_steps = 5e6;
+constexpr double not_scored = std::numeric_limits<double>::quiet_NaN();
+constexpr double least_scored_force = 1e-3;  // N: weaker ones have no direction worth comparing
+constexpr std::uintmax_t largest_path_file = 256U << 20U;
+constexpr double most_resampled = 5e6;
 constexpr const char* columns_accepted =
     "a header with time, x, y, z, fx, fy, fz, each with an optional unit: time_s,x_mm,y_mm,z_mm,fx,fy,fz";
 
@@ -166,7 +166,7 @@ Result<std::string> read_text(const fs::path& file) {
   if (!fs::exists(status)) return Error{ErrorCode::file_missing, "no such file", file.string(), {}, accepted};
   if (fs::is_directory(status)) return Error{ErrorCode::file_unsupported, "is a folder", file.string(), {}, accepted};
   const std::uintmax_t size = fs::is_regular_file(status) ? fs::file_size(file, problem) : 0;
-  if (!problem && size > largest_file)
+  if (!problem && size > largest_path_file)
     return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), file.string(), {}, "256 MiB at most"};
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return Error{ErrorCode::file_missing, "cannot be read", file.string(), {}, accepted};
@@ -227,12 +227,12 @@ Status check(const MeasuredPath& path, const ScoreSettings& settings) {
   if (!(settings.lead_in >= 0.0) || !std::isfinite(settings.lead_in))
     return Error{ErrorCode::bad_value, fmt::format("is {}", settings.lead_in), {}, "lead_in", "a length of 0 or more"};
   const double steps = path.samples.back().time.count() * settings.rate + static_cast<double>(path.samples.size());
-  if (steps > most_steps) {
+  if (steps > most_resampled) {
     return Error{ErrorCode::too_large,
                  fmt::format("takes {:.0f} ticks at {:g} Hz", steps, settings.rate),
                  {},
                  "rate",
-                 fmt::format("{:.0f} ticks at most: a lower rate or a shorter path", most_steps)};
+                 fmt::format("{:.0f} ticks at most: a lower rate or a shorter path", most_resampled)};
   }
   return success();
 }
@@ -377,13 +377,13 @@ ForceErrors compare_forces(std::span<const Vec3> measured, std::span<const Vec3>
     const double felt = measured[i].norm();
     const double answered = rendered[i].norm();
     e.error.push_back(error);
-    e.angle.push_back(nan);
+    e.angle.push_back(not_scored);
     e.peak_measured = std::max(e.peak_measured, felt);
     e.peak_rendered = std::max(e.peak_rendered, answered);
-    touched += felt >= least_force ? 1U : 0U;
-    missed += felt >= least_force && answered < least_force ? 1U : 0U;
-    added += felt < least_force && answered >= least_force ? 1U : 0U;
-    if (felt < least_force && answered < least_force) continue;
+    touched += felt >= least_scored_force ? 1U : 0U;
+    missed += felt >= least_scored_force && answered < least_scored_force ? 1U : 0U;
+    added += felt < least_scored_force && answered >= least_scored_force ? 1U : 0U;
+    if (felt < least_scored_force && answered < least_scored_force) continue;
     ++e.compared;
     squares += felt * felt;
     error_squares += error * error;
@@ -392,7 +392,7 @@ ForceErrors compare_forces(std::span<const Vec3> measured, std::span<const Vec3>
       e.largest_error = error;
       e.largest_at = i;
     }
-    if (felt < least_force || answered < least_force) continue;
+    if (felt < least_scored_force || answered < least_scored_force) continue;
     ++both;
     e.angle.back() = angle_between(measured[i], rendered[i]);
     angles += e.angle.back();
@@ -401,10 +401,10 @@ ForceErrors compare_forces(std::span<const Vec3> measured, std::span<const Vec3>
   const auto compared = static_cast<double>(std::max<std::size_t>(1, e.compared));
   e.rms_measured = std::sqrt(squares / compared);
   e.rms_error = std::sqrt(error_squares / compared);
-  e.relative = squares > 0.0 ? e.rms_error / e.rms_measured : nan;
+  e.relative = squares > 0.0 ? e.rms_error / e.rms_measured : not_scored;
   e.mean_error /= compared;
-  e.mean_angle = both > 0 ? angles / static_cast<double>(both) : nan;
-  if (both == 0) e.largest_angle = nan;
+  e.mean_angle = both > 0 ? angles / static_cast<double>(both) : not_scored;
+  if (both == 0) e.largest_angle = not_scored;
   if (touched > 0) e.missed = static_cast<double>(missed) / static_cast<double>(touched);
   if (e.samples > touched) e.added = static_cast<double>(added) / static_cast<double>(e.samples - touched);
   return e;
@@ -440,7 +440,7 @@ Result<PathScore> score_path(const Scene& scene, const MeasuredPath& path, const
   Driver driver(scene);
   const Vec3& first = path.samples.front().force;
   const Seconds tick(1.0 / settings.rate);
-  if (first.norm() >= least_force && settings.lead_in > 0.0) {
+  if (first.norm() >= least_scored_force && settings.lead_in > 0.0) {
     constexpr int ticks = 64;
     const Vec3 outside = driven.front() + first / score.stiffness + settings.lead_in * first.normalized();
     ASPERITY_CHECK(driver.go(outside, tick, 1));

@@ -12,7 +12,7 @@
 namespace asperity {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_sample = std::numeric_limits<double>::quiet_NaN();
 // A step changes the height by more than this share of the map's range, and more steeply than this, within one texel.
 constexpr double step_share = 0.25;
 constexpr double step_slope = 1.0;
@@ -87,7 +87,7 @@ class SeriesBuilder {
     const Vec3& position = tick.probe.pose.position;
     out_.time.push_back(tick.probe.time.count());
     out_.stroking.push_back(stroking ? 1 : 0);
-    out_.distance.push_back(stroking ? pose.distance + (position - pose.point).dot(pose.tangent) : nan);
+    out_.distance.push_back(stroking ? pose.distance + (position - pose.point).dot(pose.tangent) : no_sample);
     out_.force.push_back(tick.commanded.norm());
     out_.normal.push_back(tick.commanded.dot(pose.normal));
     out_.tangential.push_back(tick.commanded.dot(pose.tangent));
@@ -95,7 +95,7 @@ class SeriesBuilder {
     out_.texture.push_back(tick.rendered.parts.texture.dot(pose.tangent));
     out_.update.push_back(tick.update_seconds);
     out_.follow.push_back(followed_ == nullptr
-                              ? nan
+                              ? no_sample
                               : follow_error(*iso_of(followed_->surface),
                                              followed_->world_from_object.apply_inverse(position), follow_hint_));
     add_energy(tick);
@@ -160,9 +160,9 @@ class SeriesBuilder {
   }
 
   void add_surface(const TraceRecord& tick, const Vec3& tangent) {
-    out_.followed.push_back(nan);
-    out_.relief.push_back(nan);
-    out_.direction_error.push_back(nan);
+    out_.followed.push_back(no_sample);
+    out_.relief.push_back(no_sample);
+    out_.direction_error.push_back(no_sample);
     out_.near_step.push_back(0);
     out_.near_edge.push_back(0);
     const Instance* instance = touched(tick);
@@ -320,8 +320,8 @@ class SeriesBuilder {
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.segment({base + reach * at.up, base - reach * at.up}, 0.0, Sides::front, hint);
-    out_.followed.back() = met.hit ? at.height + deflection - scene_.probe_radius() : nan;
-    out_.relief.back() = met.hit ? reach * (1.0 - 2.0 * met.t) : nan;
+    out_.followed.back() = met.hit ? at.height + deflection - scene_.probe_radius() : no_sample;
+    out_.relief.back() = met.hit ? reach * (1.0 - 2.0 * met.t) : no_sample;
     out_.near_edge.back() = near_sharp_edge(*surface.mesh(), base) ? 1 : 0;
   }
 

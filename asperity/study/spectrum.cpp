@@ -10,7 +10,7 @@
 namespace asperity {
 namespace {
 
-constexpr std::size_t fewest_samples = 16;
+constexpr std::size_t fewest_for_a_spectrum = 16;
 constexpr std::size_t shortest_segment = 64;
 constexpr std::size_t longest_segment = 8192;
 
@@ -70,7 +70,7 @@ void find_peak(Spectrum& spectrum) {
 
 Spectrum power_spectrum(std::span<const double> signal, double spacing) {
   Spectrum spectrum;
-  if (signal.size() < fewest_samples || !(spacing > 0.0) || !std::isfinite(spacing)) return spectrum;
+  if (signal.size() < fewest_for_a_spectrum || !(spacing > 0.0) || !std::isfinite(spacing)) return spectrum;
   const std::size_t length = segment_length(signal.size());
   const std::unique_ptr<kiss_fftr_state, void (*)(void*)> plan(
       kiss_fftr_alloc(static_cast<int>(length), 0, nullptr, nullptr), [](void* memory) { kiss_fftr_free(memory); });

@@ -31,7 +31,7 @@ std::string shown(const Vec3& v) {
   return fmt::format("is {:.6g}, {:.6g}, {:.6g}", v.x(), v.y(), v.z());
 }
 
-Status check_length(double value, const char* place) {
+Status check_mapping_length(double value, const char* place) {
   if (value > 0.0 && value <= longest) return success();
   return refusal(fmt::format("is {:.6g} m", value), place, fmt::format("a length above 0, at most {:g} m", longest));
 }
@@ -77,16 +77,16 @@ Result<FeatureMapping> FeatureMapping::build(const FeatureMappingSettings& setti
   FeatureMapping mapping;
   mapping.settings_ = settings;
   if (settings.surface == IntermediateSurface::uv) {
-    for (int k = 0; k < 2; ++k) ASPERITY_CHECK(check_length(settings.tile[k], "tile"));
+    for (int k = 0; k < 2; ++k) ASPERITY_CHECK(check_mapping_length(settings.tile[k], "tile"));
     return mapping;
   }
   ASPERITY_CHECK(check_frame(settings));
   mapping.second_ = settings.axis.cross(settings.reference);
   switch (settings.surface) {
     case IntermediateSurface::cylinder:
-    case IntermediateSurface::sphere: ASPERITY_CHECK(check_length(settings.radius, "radius")); break;
+    case IntermediateSurface::sphere: ASPERITY_CHECK(check_mapping_length(settings.radius, "radius")); break;
     case IntermediateSurface::box:
-      for (int k = 0; k < 3; ++k) ASPERITY_CHECK(check_length(settings.half_extent[k], "half_extent"));
+      for (int k = 0; k < 3; ++k) ASPERITY_CHECK(check_mapping_length(settings.half_extent[k], "half_extent"));
       break;
     case IntermediateSurface::plane:
     case IntermediateSurface::uv: break;

@@ -8,7 +8,7 @@ namespace asperity {
 namespace {
 
 // A step below these shares of the relief's grain and of the mean edge is not worth making, once one has been made.
-constexpr double rest_of_grain = 5e-4;
+constexpr double relief_rest_of_grain = 5e-4;
 constexpr double rest_of_edge = 5e-6;
 // The first one always is, unless the probe has not moved at all.
 constexpr double first_rest_of_grain = 1e-10;
@@ -18,7 +18,7 @@ constexpr double stride_of_grain = 0.75;
 // A barycentric coordinate this small is 0: moving along an edge leaves rounding in it.
 constexpr double on_border = 1e-13;
 
-struct Step {
+struct ReliefStep {
   double u = 0.0;
   double v = 0.0;
   double length = 0.0;  ///< m
@@ -28,7 +28,7 @@ double coordinate(const ReliefPlace& place, int k) noexcept {
   return k == 0 ? 1.0 - place.u - place.v : (k == 1 ? place.u : place.v);
 }
 
-double change(const Step& step, int k) noexcept {
+double change(const ReliefStep& step, int k) noexcept {
   return k == 0 ? -step.u - step.v : (k == 1 ? step.u : step.v);
 }
 
@@ -37,7 +37,8 @@ double length_of(const ReliefPoint& point, double u, double v) noexcept {
 }
 
 /// Newton's step where the squared distance is convex, Gauss and Newton's where it is not.
-Step step_at(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoint& point, const Vec3& goal) noexcept {
+ReliefStep step_at(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoint& point,
+                   const Vec3& goal) noexcept {
   const Vec3 rest = point.position - goal;
   const double g_u = point.along_u.dot(rest);
   const double g_v = point.along_v.dot(rest);
@@ -53,7 +54,7 @@ Step step_at(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoi
   const double h_vv = vv + point.jet.vv * n + 2.0 * point.jet.v * turn_v;
   const double det = uu * vv - uv * uv;
   const double newton_det = h_uu * h_vv - h_uv * h_uv;
-  Step step;
+  ReliefStep step;
   // Not convex, or nearly flat: its step would be no guide.
   constexpr double least_share = 0.02;
   if (h_uu > 0.0 && newton_det > least_share * det) {
@@ -68,10 +69,10 @@ Step step_at(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoi
 }
 
 /// The best step along the edge opposite corner k.
-Step step_along_edge(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoint& point, const Vec3& goal,
-                     int k) noexcept {
+ReliefStep step_along_edge(const ReliefFrame& frame, const ReliefPlace& place, const ReliefPoint& point,
+                           const Vec3& goal, int k) noexcept {
   // Along it the coordinates of the other two corners change by equal amounts.
-  Step along{k == 0 ? -1.0 : (k == 1 ? 0.0 : 1.0), k == 0 ? 1.0 : (k == 1 ? 1.0 : 0.0), 0.0};
+  ReliefStep along{k == 0 ? -1.0 : (k == 1 ? 0.0 : 1.0), k == 0 ? 1.0 : (k == 1 ? 1.0 : 0.0), 0.0};
   const Vec3 tangent = along.u * point.along_u + along.v * point.along_v;
   const Vec3 rest = point.position - goal;
   const double square = tangent.squaredNorm();
@@ -90,26 +91,26 @@ Step step_along_edge(const ReliefFrame& frame, const ReliefPlace& place, const R
   return along;
 }
 
-bool admissible(const ReliefPlace& place, const Step& step) noexcept {
+bool admissible(const ReliefPlace& place, const ReliefStep& step) noexcept {
   for (int k = 0; k < 3; ++k) {
     if (coordinate(place, k) <= on_border && change(step, k) < 0.0) return false;
   }
   return true;
 }
 
-class Walker {
+class ReliefWalker {
  public:
-  Walker(const ReliefSurface& surface, Descent& descent) noexcept
+  ReliefWalker(const ReliefSurface& surface, Descent& descent) noexcept
       : surface_(surface),
         descent_(descent),
         place_(*descent.place),
-        rest_(std::min(rest_of_grain * surface.grain(), rest_of_edge * surface.base().mesh().mean_edge())) {}
+        rest_(std::min(relief_rest_of_grain * surface.grain(), rest_of_edge * surface.base().mesh().mean_edge())) {}
 
   DescentEnd run() noexcept {
     while (descent_.moves < descent_.budget) {
       if (descent_.may_leave && leaves()) return DescentEnd::left;
       aim();
-      Step step = step_at(place_.frame, place_, descent_.point, goal_);
+      ReliefStep step = step_at(place_.frame, place_, descent_.point, goal_);
       const double enough = descent_.moves == 0 ? first_rest_of_grain * surface_.grain() : rest_;
       if (step.length <= std::min(enough, rest_)) return DescentEnd::rest;
       if (!admissible(place_, step)) {
@@ -147,7 +148,7 @@ class Walker {
   }
 
   /// The step points out of the triangle at an edge or vertex: looks for the face, or edge, that it can go on in.
-  Choice at_border(Step& step) noexcept {
+  Choice at_border(ReliefStep& step) noexcept {
     int zeros = 0;
     int zero = 0;
     int whole = 0;
@@ -162,7 +163,7 @@ class Walker {
     return zeros == 1 ? at_edge(step, zero) : at_vertex(step, whole);
   }
 
-  Choice at_edge(Step& step, int k) noexcept {
+  Choice at_edge(ReliefStep& step, int k) noexcept {
     ReliefPlace across = place_;
     const ReliefPoint before = descent_.point;
     const double distance = (before.position - goal_).squaredNorm();
@@ -174,7 +175,7 @@ class Walker {
     // Without stitching the other face may stand higher: a wall.
     const bool wall = surface_.has_jumps() && (there.position - goal_).squaredNorm() > distance;
     if (!wall) {
-      const Step onward = step_at(across.frame, across, there, goal_);
+      const ReliefStep onward = step_at(across.frame, across, there, goal_);
       if (admissible(across, onward)) {
         place_ = across;
         descent_.point = there;
@@ -185,18 +186,18 @@ class Walker {
     return along_edge(step, k);
   }
 
-  Choice along_edge(Step& step, int k) noexcept {
+  Choice along_edge(ReliefStep& step, int k) noexcept {
     step = step_along_edge(place_.frame, place_, descent_.point, goal_, k);
     return step.length <= rest_ || !admissible(place_, step) ? Choice::rest : Choice::go;
   }
 
   /// At a vertex every face around it is tried, then every edge.
-  Choice at_vertex(Step& step, int corner) noexcept {
+  Choice at_vertex(ReliefStep& step, int corner) noexcept {
     const TriangleMesh& mesh = surface_.base().mesh();
     const std::uint32_t vertex = mesh.triangles()[place_.frame.face][static_cast<std::size_t>(corner)];
     ReliefPlace best;
     ReliefPoint best_point;
-    Step best_step;
+    ReliefStep best_step;
     bool rim = false;
     for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
       if (descent_.moves >= descent_.budget) break;
@@ -207,10 +208,10 @@ class Walker {
       here.v = t[2] == vertex ? 1.0 : 0.0;
       const ReliefPoint point = evaluate(here);
       const int own = t[0] == vertex ? 0 : (t[1] == vertex ? 1 : 2);
-      Step options[3] = {step_at(here.frame, here, point, goal_),
-                         step_along_edge(here.frame, here, point, goal_, (own + 1) % 3),
-                         step_along_edge(here.frame, here, point, goal_, (own + 2) % 3)};
-      for (const Step& option : options) {
+      ReliefStep options[3] = {step_at(here.frame, here, point, goal_),
+                               step_along_edge(here.frame, here, point, goal_, (own + 1) % 3),
+                               step_along_edge(here.frame, here, point, goal_, (own + 2) % 3)};
+      for (const ReliefStep& option : options) {
         if (option.length <= best_step.length || !admissible(here, option)) continue;
         best = here;
         best_point = point;
@@ -226,7 +227,7 @@ class Walker {
   }
 
   /// Goes along the step as far as the distance falls, at most to the triangle's border. False when it cannot.
-  bool advance(const Step& step) noexcept {
+  bool advance(const ReliefStep& step) noexcept {
     double far = 1.0;
     int border = -1;
     for (int k = 0; k < 3; ++k) {
@@ -260,7 +261,7 @@ class Walker {
     return false;
   }
 
-  bool attempt(const ReliefPlace& from, const Step& step, double share, int border, double& distance) noexcept {
+  bool attempt(const ReliefPlace& from, const ReliefStep& step, double share, int border, double& distance) noexcept {
     ReliefPlace& to = place_;
     const double u = to.u;
     const double v = to.v;
@@ -335,7 +336,7 @@ bool cross_edge(const ReliefSurface& surface, ReliefPlace& place, int k) noexcep
 }
 
 DescentEnd descend(const ReliefSurface& surface, Descent& descent) noexcept {
-  return Walker(surface, descent).run();
+  return ReliefWalker(surface, descent).run();
 }
 
 }  // namespace asperity

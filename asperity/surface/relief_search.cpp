@@ -268,9 +268,9 @@ class PatchRay {
 };
 
 /// Searches triangles for the point of their relief that is nearest to a point.
-class NearestSearch {
+class ReliefNearestSearch {
  public:
-  NearestSearch(const ReliefSurface& surface, const Vec3& p, double bound, const CoatMoment& moment) noexcept
+  ReliefNearestSearch(const ReliefSurface& surface, const Vec3& p, double bound, const CoatMoment& moment) noexcept
       : surface_(surface), p_(p), moment_(moment), distance_(bound) {}
 
   [[nodiscard]] double distance() const noexcept { return distance_; }
@@ -453,7 +453,7 @@ void ReliefSurface::contacts(const Vec3& position, double radius, Sides, Hint& h
 }
 
 Foot ReliefSurface::closest(const Vec3& p, double bound, Hint& hint) const noexcept {
-  NearestSearch search(*this, p, bound, hint.moment);
+  ReliefNearestSearch search(*this, p, bound, hint.moment);
   const ReliefPlace& last = hint.relief;
   if (holds(last.frame, last.frame.face, hint.moment)) search.descend_from(last);
   if (!search.found() && bound == infinity) {

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "asperity/io/detail/mesh_readers.h"
+
 namespace asperity::mesh_readers {
 namespace {
 
@@ -284,12 +286,6 @@ void note_what_is_left_out(const Json& root, std::vector<std::string>& notes) {
 }
 
 // ---- containers and buffers
-
-std::uint32_t bits_at(std::string_view bytes, std::size_t at) {
-  std::uint32_t bits = 0;
-  for (std::size_t i = 4; i-- > 0;) bits = (bits << 8U) | static_cast<std::uint8_t>(bytes[at + i]);
-  return bits;
-}
 
 std::string without_percents(std::string_view uri) {
   const auto digit = [](char c) {

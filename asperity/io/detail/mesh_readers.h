@@ -31,6 +31,13 @@ bool parse_number(std::string_view token, double& value);
 /// Reads a decimal integer that makes up the whole token.
 bool parse_integer(std::string_view token, std::int64_t& value);
 
+/// Reads a little-endian 32-bit pattern; `at` + 4 must lie within `bytes`.
+inline std::uint32_t bits_at(std::string_view bytes, std::size_t at) {
+  std::uint32_t bits = 0;
+  for (std::size_t i = 4; i-- > 0;) bits = (bits << 8U) | static_cast<std::uint8_t>(bytes[at + i]);
+  return bits;
+}
+
 inline bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
 }

@@ -11,7 +11,7 @@ namespace asperity {
 namespace {
 
 // One tick may leave the surface and meet it again this often: over a field of needles.
-constexpr int most_flights = 16;
+constexpr int most_iso_flights = 16;
 
 class IsoProxy {
  public:
@@ -22,7 +22,7 @@ class IsoProxy {
   ProxyRest run(const Vec3& from) noexcept {
     if (!state_.touching && !fly(from)) return free();
     away_ = state_.iso.normal;
-    for (int flight = 0; flight < most_flights; ++flight) {
+    for (int flight = 0; flight < most_iso_flights; ++flight) {
       const IsoEnd end = settle();
       if (end != IsoEnd::left && end != IsoEnd::rim) return resting(end != IsoEnd::limited);
       // At the rim it starts within the volume: what comes in from outside has no side.

@@ -7,7 +7,7 @@ namespace asperity {
 namespace {
 
 // One tick may leave the surface and meet it again this often: over a field of ridges.
-constexpr int most_flights = 16;
+constexpr int most_parametric_flights = 16;
 
 class ParametricProxy {
  public:
@@ -22,7 +22,7 @@ class ParametricProxy {
     } else if (!fly(from)) {
       return free();
     }
-    for (int flight = 0; flight < most_flights; ++flight) {
+    for (int flight = 0; flight < most_parametric_flights; ++flight) {
       const DescentEnd end = settle();
       if (end != DescentEnd::left && end != DescentEnd::rim) return resting(end != DescentEnd::limited);
       const Vec3 start = state_.iso.point + surface_.skin() * state_.iso.normal;

@@ -10,7 +10,7 @@ namespace asperity {
 namespace {
 
 // One tick may leave the surface and meet it again this often: over a field of needles.
-constexpr int most_flights = 16;
+constexpr int most_relief_flights = 16;
 class ReliefProxy {
  public:
   ReliefProxy(const ReliefSurface& surface, Sides sides, const Friction& friction, const Vec3& from, const Vec3& probe,
@@ -26,7 +26,7 @@ class ReliefProxy {
     } else {
       position_ = state_.point.position;
     }
-    for (int flight = 0; flight < most_flights; ++flight) {
+    for (int flight = 0; flight < most_relief_flights; ++flight) {
       const DescentEnd end = settle();
       if (end != DescentEnd::left && end != DescentEnd::rim) return resting(end != DescentEnd::limited);
       if (end == DescentEnd::left && friction_.grip > 0.0 && holds_on()) {

@@ -102,11 +102,6 @@ json plot_rows(const RunSeries& series, const Column& x, const std::vector<Colum
   return {{"labels", labels}, {"rows", rows}, {"ticks", ticks.size()}, {"shown", kept.size()}};
 }
 
-json significant(double value) {
-  if (!std::isfinite(value)) return nullptr;
-  return value == 0.0 ? json(0.0) : json(std::stod(fmt::format("{:.5g}", value)));
-}
-
 /// Rows [frequency, amplitude density of each], in N per root of the frequency's unit.
 json spectrum_rows(const char* unit, const Spectrum& normal, const Spectrum& tangential) {
   json rows = json::array();
@@ -267,6 +262,11 @@ json loop_rate_data(const std::vector<LoopRateRow>& rows) {
 }
 
 }  // namespace
+
+json significant(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  return value == 0.0 ? json(0.0) : json(std::stod(fmt::format("{:.5g}", value)));
+}
 
 Status check_series(const RunSeries& series, const std::string& place) {
   const std::size_t n = series.time.size();

@@ -12,6 +12,9 @@ namespace asperity {
 nlohmann::json run_data(const RunReport& report);
 nlohmann::json compare_data(const CompareReport& report);
 
+/// A number of a page at five digits, which no plot can tell from all of them; null where it is not finite.
+nlohmann::json significant(double value);
+
 /// Errors: bad_value when the columns of a series differ in length.
 Status check_series(const RunSeries& series, const std::string& place);
 

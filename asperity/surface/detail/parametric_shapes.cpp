@@ -9,7 +9,7 @@ namespace asperity {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // Profile of the vase: heights (share of the whole) and radii of the widest place, the neck and the ends.
 constexpr double belly_height = 0.3;
