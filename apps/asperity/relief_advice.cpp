@@ -10,12 +10,6 @@
 namespace asperity::program {
 namespace {
 
-const char* knob_name(Knob knob) {
-  static constexpr std::array<const char*, knob_count> names{"height_m", "wave_m", "force_n", "speed_m_s",
-                                                             "stiffness_n_m"};
-  return names[static_cast<std::size_t>(knob)];
-}
-
 /// "fidelity, hand": what does not pass.
 std::string failing(const Renderability& answer) {
   std::vector<std::string> names;
@@ -54,7 +48,7 @@ double pressing_force(const Experiment& experiment, double stiffness) {
 Json suggestion_json(const RenderSuggestion& suggestion) {
   Json changes = Json::array();
   for (const KnobChange& change : suggestion.changes)
-    changes.push_back({{"what", knob_name(change.knob)}, {"from", change.from}, {"to", change.to}});
+    changes.push_back({{"what", to_string(change.knob)}, {"from", change.from}, {"to", change.to}});
   return {{"text", suggestion.text}, {"changes", changes}};
 }
 

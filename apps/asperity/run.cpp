@@ -189,7 +189,7 @@ std::vector<ReportFact> setup_facts(const Experiment& experiment) {
                                          experiment.device.max_force, experiment.device.max_stiffness * 1e-3,
                                          format_length(experiment.device.position_resolution))});
   const double radius = experiment.scene.probe_radius();
-  facts.push_back({"probe", fmt::format("{}, {}, {:g} Hz", experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic",
+  facts.push_back({"probe", fmt::format("{}, {}, {:g} Hz", to_string(experiment.probe),
                                         radius > 0.0 ? "radius " + format_length(radius) : std::string("a point"),
                                         experiment.rate)});
   if (experiment.probe == ProbeKind::dynamic) facts.push_back({"hand", experiment.hand.name});

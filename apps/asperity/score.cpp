@@ -100,8 +100,7 @@ Status synthesise(const ScoreOptions& options, const Experiment& experiment, con
 
 Result<MeasuredPath> read_path(const ScoreOptions& options) {
   ASPERITY_TRY(MeasuredPath path, read_measured_path(options.file));
-  if (options.positions == "surface") path.place = PathPlace::surface;
-  if (options.positions == "probe") path.place = PathPlace::probe;
+  path.place = value_named<PathPlace>(options.positions).value_or(path.place);
   return path;
 }
 
@@ -205,12 +204,8 @@ Result<int> score(const ScoreOptions& options, const Console& console) {
                               ? fs::path("out") / (folder_name(fs::path(options.file).stem().string()) + "-score")
                               : fs::path(options.out);
   ASPERITY_CHECK(make_output_folder(folder.string()));
-  Json document{{"program", program_name()},
-                {"command", console.command_line},
-                {"file", options.file},
-                {"scene", experiment.name},
-                {"positions", report.path.place == PathPlace::surface ? "surface" : "probe"},
-                {"notes", experiment.notes}};
+  Json document{{"program", program_name()}, {"command", console.command_line},           {"file", options.file},
+                {"scene", experiment.name},  {"positions", to_string(report.path.place)}, {"notes", experiment.notes}};
   for (const PathScore& one : report.scores) document["laws"].push_back(score_json(one, report.path));
   if (!options.no_report) {
     report.origin = report_origin(experiment, console);
@@ -272,7 +267,7 @@ void add_score(Arguments& program, Console& console, Action& action) {
       .option("--positions", options->positions,
               "surface: on the true surface, so that laws are driven at x - F / k (default of CSV files); probe: "
               "of a device's probe, where laws are driven as it is (default of traces)")
-      .one_of({"surface", "probe"});
+      .one_of(all_names<PathPlace>());
   command.flag("--synthesise", options->synthesise,
                "First write FILE: what the exact geometry answers on the scene's stroke");
   command.option("--out", options->out, "Folder of the outputs; default out/FILE-score");

@@ -115,8 +115,7 @@ void print_summary(const Experiment& experiment, const RunResult& run, const Run
   const RunMetrics& m = report.metrics;
   std::cout << fmt::format("scene    {}\n", experiment.name);
   std::cout << fmt::format("law      {}\n", report.law);
-  std::cout << fmt::format("device   {}, {} probe\n", experiment.device.name,
-                           experiment.probe == ProbeKind::ideal ? "ideal" : "dynamic");
+  std::cout << fmt::format("device   {}, {} probe\n", experiment.device.name, to_string(experiment.probe));
   std::cout << fmt::format("stroke   {}\n", report.setup.back().value);
   std::cout << fmt::format("ticks    {} at {:g} Hz, {} in contact\n", run.summary.ticks, experiment.rate,
                            m.ticks.contact);

@@ -27,6 +27,11 @@ struct Pose {
   }
 };
 
+/// The axis-aligned box around a box that was moved by `pose`; an empty one stays empty. [any]
+inline Box transformed(const Box& box, const Pose& pose) {
+  return box.mapped([&](const Vec3& corner) { return pose.apply(corner); });
+}
+
 /// Linear (m/s) and angular (rad/s) velocity, world frame.
 struct Twist {
   Vec3 linear = Vec3::Zero();

@@ -42,10 +42,24 @@ struct Box {
   [[nodiscard]] bool empty() const { return (lower.array() > upper.array()).any(); }
   [[nodiscard]] Vec3 centre() const { return 0.5 * (lower + upper); }
   [[nodiscard]] Vec3 extent() const { return upper - lower; }
+  /// Corner 0 to 7: bit `a` of `k` takes the upper end along axis a.
+  [[nodiscard]] Vec3 corner(unsigned k) const {
+    return {((k & 1U) != 0 ? upper : lower).x(), ((k & 2U) != 0 ? upper : lower).y(),
+            ((k & 4U) != 0 ? upper : lower).z()};
+  }
   /// Length of the diagonal (m); 0 for an empty box.
   [[nodiscard]] double diagonal() const { return empty() ? 0.0 : extent().norm(); }
   /// The box grown by `margin` (m) on every side.
   [[nodiscard]] Box grown(double margin) const { return {lower.array() - margin, upper.array() + margin}; }
+  /// The box around what `map` (Vec3 to Vec3, affine) makes of this one: around its eight corners. An empty box stays
+  /// empty.
+  template <class Map>
+  [[nodiscard]] Box mapped(const Map& map) const {
+    Box out;
+    if (empty()) return out;
+    for (unsigned k = 0; k < 8; ++k) out.include(Vec3(map(corner(k))));
+    return out;
+  }
 };
 
 }  // namespace asperity

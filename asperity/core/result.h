@@ -1,10 +1,15 @@
 #pragma once
 // Loading and authoring answer a Result: the value, or an Error with a named cause, the file and the place in it.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
 #include <variant>
+
+#include "asperity/core/names.h"
+
+#include "asperity/core/names.h"
 
 namespace asperity {
 
@@ -25,9 +30,24 @@ enum class ErrorCode {
   too_large,         ///< would exceed a stated memory or size bound
   mismatch,          ///< two inputs do not belong together (trace and scene, map sizes)
 };
-
-/// Stable name of the cause, used in messages and `--json` ("bad_value"). [any]
-const char* to_string(ErrorCode code);
+/// As in messages and `--json`.
+template <>
+struct Names<ErrorCode> {
+  static constexpr auto table = std::to_array<Named<ErrorCode>>({{ErrorCode::file_missing, "file_missing"},
+                                                                 {ErrorCode::file_empty, "file_empty"},
+                                                                 {ErrorCode::file_truncated, "file_truncated"},
+                                                                 {ErrorCode::file_malformed, "file_malformed"},
+                                                                 {ErrorCode::file_unsupported, "file_unsupported"},
+                                                                 {ErrorCode::file_unwritable, "file_unwritable"},
+                                                                 {ErrorCode::bad_key, "bad_key"},
+                                                                 {ErrorCode::bad_type, "bad_type"},
+                                                                 {ErrorCode::bad_value, "bad_value"},
+                                                                 {ErrorCode::bad_mesh, "bad_mesh"},
+                                                                 {ErrorCode::bad_map, "bad_map"},
+                                                                 {ErrorCode::unsupported_pair, "unsupported_pair"},
+                                                                 {ErrorCode::too_large, "too_large"},
+                                                                 {ErrorCode::mismatch, "mismatch"}});
+};
 
 /// What went wrong, where, and what would have been accepted.
 struct Error {
@@ -48,7 +68,18 @@ struct Error {
   [[nodiscard]] Error at(const std::string& prefix) &&;
 };
 
-/// Value or Error. `[[nodiscard]]`: an ignored result is a defect.
+namespace detail {
+/// Says on standard error what was asked for in vain, and aborts: `error` is what is there in place of the value,
+/// nullptr where there is a value in place of the error. [any]
+#if defined(__GNUC__)
+[[gnu::cold]]
+#endif
+[[noreturn]] void
+wrong_side_of_result(const Error* error) noexcept;
+}  // namespace detail
+
+/// Value or Error. `[[nodiscard]]`: an ignored result is a defect. Asking an error for its value, or a value for its
+/// error, ends the program with the error's words on standard error, in every build: ask ok() first.
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -58,20 +89,28 @@ class [[nodiscard]] Result {
   [[nodiscard]] bool ok() const { return content_.index() == 0; }
   explicit operator bool() const { return ok(); }
 
-  [[nodiscard]] T& value() & { return *std::get_if<0>(&content_); }
-  [[nodiscard]] const T& value() const& { return *std::get_if<0>(&content_); }
-  [[nodiscard]] T&& value() && { return std::move(*std::get_if<0>(&content_)); }
+  [[nodiscard]] T& value() & { return *checked<0>(content_); }
+  [[nodiscard]] const T& value() const& { return *checked<0>(content_); }
+  [[nodiscard]] T&& value() && { return std::move(*checked<0>(content_)); }
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
   T&& operator*() && { return std::move(*this).value(); }
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
 
-  [[nodiscard]] Error& error() & { return *std::get_if<1>(&content_); }
-  [[nodiscard]] const Error& error() const& { return *std::get_if<1>(&content_); }
-  [[nodiscard]] Error&& error() && { return std::move(*std::get_if<1>(&content_)); }
+  [[nodiscard]] Error& error() & { return *checked<1>(content_); }
+  [[nodiscard]] const Error& error() const& { return *checked<1>(content_); }
+  [[nodiscard]] Error&& error() && { return std::move(*checked<1>(content_)); }
 
  private:
+  template <std::size_t Side, class Content>
+  static auto* checked(Content& content) {
+    auto* there = std::get_if<Side>(&content);
+    if (there == nullptr) [[unlikely]]
+      detail::wrong_side_of_result(std::get_if<1>(&content));
+    return there;
+  }
+
   std::variant<T, Error> content_;
 };
 

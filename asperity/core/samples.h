@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "asperity/core/frames.h"
+#include "asperity/core/names.h"
 #include "asperity/core/units.h"
 
 namespace asperity {
@@ -33,6 +34,22 @@ enum class TickFlag : std::uint32_t {
   coarse_data = 1u << 9,     ///< part of a volume was not in memory yet and was felt from a coarser level
   field_force = 1u << 10,    ///< a volume without a surface pushes
   texture_faded = 1u << 11,  ///< a texture is finer than speed or device can render, and was felt weaker
+};
+/// As in reports.
+template <>
+struct Names<TickFlag> {
+  static constexpr auto table = std::to_array<Named<TickFlag>>({{TickFlag::contact, "contact"},
+                                                                {TickFlag::not_converged, "not_converged"},
+                                                                {TickFlag::started_inside, "started_inside"},
+                                                                {TickFlag::input_not_finite, "input_not_finite"},
+                                                                {TickFlag::force_limited, "force_limited"},
+                                                                {TickFlag::slew_limited, "slew_limited"},
+                                                                {TickFlag::output_not_finite, "output_not_finite"},
+                                                                {TickFlag::contacts_dropped, "contacts_dropped"},
+                                                                {TickFlag::energy_limited, "energy_limited"},
+                                                                {TickFlag::coarse_data, "coarse_data"},
+                                                                {TickFlag::field_force, "field_force"},
+                                                                {TickFlag::texture_faded, "texture_faded"}});
 };
 
 /// A set of TickFlag.

@@ -1,7 +1,6 @@
 #include "asperity/device/stroke.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -16,8 +15,6 @@ namespace asperity {
 namespace {
 
 constexpr std::size_t max_samples = 2'000'000;
-constexpr std::array<const char*, 6> type_names{"line", "raster", "circle", "spiral", "polyline", "recorded"};
-
 Error bad_value(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
 }
@@ -262,19 +259,11 @@ std::vector<Vec3> smoothed(const std::vector<Vec3>& normals, const std::vector<d
 
 }  // namespace
 
-const char* to_string(StrokeType type) {
-  return type_names[static_cast<std::size_t>(type)];
-}
-
 Result<StrokeType> find_stroke_type(std::string_view name) {
-  const std::vector<std::string> names(type_names.begin(), type_names.end());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == name) return static_cast<StrokeType>(i);
-  }
-  const std::string near = nearest_name(name, names);
+  if (const std::optional<StrokeType> type = value_named<StrokeType>(name)) return *type;
+  const std::string near = nearest_name(name, all_names<StrokeType>());
   const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return bad_value("type", fmt::format("stroke type \"{}\" is not known{}", name, hint),
-                   fmt::format("{}", fmt::join(names, ", ")));
+  return bad_value("type", fmt::format("stroke type \"{}\" is not known{}", name, hint), name_list<StrokeType>());
 }
 
 /// Fills a StrokePath step by step; the path is immutable once it is out.

@@ -30,14 +30,22 @@ struct TimedPoint {
 
 /// Shape of the path.
 enum class StrokeType { line, raster, circle, spiral, polyline, recorded };
+/// As in scene files.
+template <>
+struct Names<StrokeType> {
+  static constexpr auto table = std::to_array<Named<StrokeType>>({{StrokeType::line, "line"},
+                                                                  {StrokeType::raster, "raster"},
+                                                                  {StrokeType::circle, "circle"},
+                                                                  {StrokeType::spiral, "spiral"},
+                                                                  {StrokeType::polyline, "polyline"},
+                                                                  {StrokeType::recorded, "recorded"}});
+};
 /// What is held along the path: a depth or a force.
 enum class PressMode {
   depth,  ///< the probe is led at `depth` below the surface
   force,  ///< the hand presses with `normal_force`
 };
 
-/// "line", "raster", ...; for messages and scene files. [any]
-const char* to_string(StrokeType type);
 /// The type called `name`. Errors: bad_value with the nearest name and the list. [build]
 Result<StrokeType> find_stroke_type(std::string_view name);
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 
 namespace asperity {
 
@@ -11,6 +12,12 @@ namespace asperity {
 enum class CellReconstruction : std::uint8_t {
   trilinear,  ///< as large-data-2008; its gradient jumps at cell faces
   smooth,     ///< tricubic, Hermite with slopes of second order on stretched axes: its gradient is continuous
+};
+/// As in scene files.
+template <>
+struct Names<CellReconstruction> {
+  static constexpr auto table = std::to_array<Named<CellReconstruction>>(
+      {{CellReconstruction::trilinear, "trilinear"}, {CellReconstruction::smooth, "smooth"}});
 };
 
 /// Cell (i, j, k) of a level of a field.

@@ -38,15 +38,8 @@ class ExactBand {
   /// Makes the points that have a face exact; answers the largest correction (m).
   double correct(const Progress& progress) {
     std::vector<double> corrections(blocks_.size(), 0.0);
-    std::atomic<std::size_t> done{0};
-    const std::thread::id caller = std::this_thread::get_id();
-    for_each_in_parallel(blocks_.size(), [&](std::size_t b) {
-      corrections[b] = correct_block(blocks_[b]);
-      const std::size_t count = ++done;
-      // From one thread alone: who looks on need not expect more.
-      if (progress && b % 64 == 0 && std::this_thread::get_id() == caller)
-        progress("exact distances", static_cast<double>(count) / static_cast<double>(blocks_.size()));
-    });
+    parallel_for(blocks_.size(), {.grain = shared_out.grain, .progress = &progress, .what = "exact distances"},
+                 [&](std::size_t b) { corrections[b] = correct_block(blocks_[b]); });
     return corrections.empty() ? 0.0 : *std::max_element(corrections.begin(), corrections.end());
   }
 
@@ -59,7 +52,7 @@ class ExactBand {
       for (std::uint32_t n = 0; n < SparseBlock::points; ++n) propose_around({b, n}, candidates);
     }
     while (!candidates.empty()) {
-      for_each_in_parallel(candidates.size(), [&](std::size_t i) { try_candidate(candidates[i]); });
+      parallel_for(candidates.size(), shared_out, [&](std::size_t i) { try_candidate(candidates[i]); });
       std::vector<Candidate> next;
       for (const Candidate& candidate : candidates) {
         if (candidate.face == no_index) continue;

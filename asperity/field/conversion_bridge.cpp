@@ -35,7 +35,7 @@ class Bridge {
     if (edge_.empty()) return;
     for (const Node& node : edge_) offer(node, distance_to_crossing(node));
     march();
-    for_each_in_parallel(blocks_.size(), [&](std::size_t b) {
+    parallel_for(blocks_.size(), shared_out, [&](std::size_t b) {
       for (std::uint32_t n = 0; n < SparseBlock::points; ++n) {
         const Node node{static_cast<std::uint32_t>(b), n};
         if (!signed_[b][n]) take_sign(node, winding(node));

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <utility>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 namespace {
@@ -16,36 +16,10 @@ namespace {
 /// Below this many nodes a second thread costs more than it brings.
 constexpr std::size_t parallel_nodes = std::size_t{1} << 18U;
 
-constexpr std::array<std::pair<DerivedField, const char*>, 4> field_names{{
-    {DerivedField::vorticity_magnitude, "vorticity_magnitude"},
-    {DerivedField::q_criterion, "q_criterion"},
-    {DerivedField::helicity, "helicity"},
-    {DerivedField::gradient_magnitude, "gradient_magnitude"},
-}};
-constexpr std::array<std::pair<VectorPart, const char*>, 4> part_names{{
-    {VectorPart::magnitude, "magnitude"},
-    {VectorPart::x, "x"},
-    {VectorPart::y, "y"},
-    {VectorPart::z, "z"},
-}};
-
-template <class Names>
-auto parse_name(const Names& names, std::string_view name, const char* what)
-    -> Result<typename Names::value_type::first_type> {
-  std::string accepted;
-  for (const auto& [value, known] : names) {
-    if (name == known) return value;
-    accepted += accepted.empty() ? known : fmt::format(", {}", known);
-  }
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no {}", name, what), "", "", accepted};
-}
-
-template <class Names, class Value>
-const char* name_of(const Names& names, Value value) {
-  for (const auto& [known, name] : names) {
-    if (known == value) return name;
-  }
-  return "unknown";
+template <HasNames E>
+Result<E> parse_name(std::string_view name, const char* what) {
+  if (const std::optional<E> value = value_named<E>(name)) return *value;
+  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no {}", name, what), "", "", name_list<E>()};
 }
 
 using AxisStencils = std::vector<DerivativeStencil>;
@@ -84,30 +58,21 @@ class Slopes {
   std::array<std::size_t, 3> stride_;
 };
 
-/// `node_value(at)` for every node, layers shared among two threads where that pays.
+/// `node_value(at)` for every node, layers shared out over all cores where that pays.
 template <class NodeValue>
 std::vector<float> for_all_nodes(const GridAxes& axes, std::string_view what, const Progress& progress,
                                  const NodeValue& node_value) {
   const std::size_t layer = static_cast<std::size_t>(axes[0].size()) * axes[1].size();
   std::vector<float> out(layer * axes[2].size());
-  std::atomic<std::uint32_t> next{0};
-  const auto work = [&](bool report) {
-    for (std::uint32_t k = next.fetch_add(1); k < axes[2].size(); k = next.fetch_add(1)) {
-      if (report && progress) progress(what, static_cast<double>(k) / axes[2].size());
-      float* to = out.data() + layer * k;
-      for (std::uint32_t j = 0; j < axes[1].size(); ++j) {
-        for (std::uint32_t i = 0; i < axes[0].size(); ++i)
-          *to++ = static_cast<float>(node_value(std::array<std::uint32_t, 3>{i, j, k}));
-      }
+  const auto fill = [&](std::size_t k) {
+    float* to = out.data() + layer * k;
+    for (std::uint32_t j = 0; j < axes[1].size(); ++j) {
+      for (std::uint32_t i = 0; i < axes[0].size(); ++i)
+        *to++ = static_cast<float>(node_value(std::array<std::uint32_t, 3>{i, j, static_cast<std::uint32_t>(k)}));
     }
   };
-  if (out.size() >= parallel_nodes) {
-    std::thread helper(work, false);
-    work(true);
-    helper.join();
-  } else {
-    work(true);
-  }
+  parallel_for(axes[2].size(), {.threads = out.size() < parallel_nodes ? 1U : 0U, .progress = &progress, .what = what},
+               fill);
   return out;
 }
 
@@ -154,20 +119,12 @@ std::string derived_name(const std::string& of, const char* what) {
 
 }  // namespace
 
-const char* to_string(DerivedField field) {
-  return name_of(field_names, field);
-}
-
 Result<DerivedField> parse_derived_field(std::string_view name) {
-  return parse_name(field_names, name, "derived field");
-}
-
-const char* to_string(VectorPart part) {
-  return name_of(part_names, part);
+  return parse_name<DerivedField>(name, "derived field");
 }
 
 Result<VectorPart> parse_vector_part(std::string_view name) {
-  return parse_name(part_names, name, "part of a vector");
+  return parse_name<VectorPart>(name, "part of a vector");
 }
 
 DerivativeStencil derivative_stencil(const GridAxis& axis, std::uint32_t node) noexcept {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string_view>
 
+#include "asperity/core/names.h"
 #include "asperity/core/progress.h"
 #include "asperity/field/scalar_grid.h"
 
@@ -17,15 +18,26 @@ enum class DerivedField : std::uint8_t {
   helicity,             ///< u . curl u (m/s^2): positive where the flow turns clockwise as seen along it
   gradient_magnitude,   ///< of scalars |grad f| (unit/m); of vectors the Frobenius norm of all nine slopes (1/s)
 };
-/// Stable name, as in scene files and options: "vorticity_magnitude", ... [any]
-const char* to_string(DerivedField field);
+/// As in scene files and options.
+template <>
+struct Names<DerivedField> {
+  static constexpr auto table =
+      std::to_array<Named<DerivedField>>({{DerivedField::vorticity_magnitude, "vorticity_magnitude"},
+                                          {DerivedField::q_criterion, "q_criterion"},
+                                          {DerivedField::helicity, "helicity"},
+                                          {DerivedField::gradient_magnitude, "gradient_magnitude"}});
+};
 /// Errors: bad_value, listing the names. [build]
 Result<DerivedField> parse_derived_field(std::string_view name);
 
 /// Which number of a vector is meant.
 enum class VectorPart : std::uint8_t { magnitude, x, y, z };
-/// "magnitude", "x", "y", "z". [any]
-const char* to_string(VectorPart part);
+/// As in scene files and options.
+template <>
+struct Names<VectorPart> {
+  static constexpr auto table = std::to_array<Named<VectorPart>>(
+      {{VectorPart::magnitude, "magnitude"}, {VectorPart::x, "x"}, {VectorPart::y, "y"}, {VectorPart::z, "z"}});
+};
 /// Errors: bad_value, listing the names. [build]
 Result<VectorPart> parse_vector_part(std::string_view name);
 
@@ -33,7 +45,7 @@ Result<VectorPart> parse_vector_part(std::string_view name);
 Status validate(const VectorGrid& grid);
 
 /// A scalar of a velocity field, of the same axes, in float32, named as the field. What is not a number at a node is
-/// not a number at the nodes whose derivatives need it, and nowhere else. On two threads where the grid is large.
+/// not a number at the nodes whose derivatives need it, and nowhere else. On all cores where the grid is large.
 /// Errors: mismatch, bad_value (as ScalarGrid::build). [build]
 Result<ScalarGrid> derive(const VectorGrid& velocity, DerivedField field, const Progress& progress = {});
 /// The same of a scalar field. Errors: bad_value (anything but gradient_magnitude needs vectors). [build]

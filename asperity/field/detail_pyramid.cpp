@@ -412,14 +412,6 @@ Status check_size(const DetailSettings& settings, const HeightMap& heights, cons
 
 }  // namespace
 
-const char* to_string(DetailKind kind) {
-  switch (kind) {
-    case DetailKind::dilation: return "dilation";
-    case DetailKind::low_pass: return "low_pass";
-  }
-  return "unknown";
-}
-
 Result<HeightMap> dilated(const HeightMap& heights, const Vec2& tile, double radius) {
   ASPERITY_CHECK(check_pyramid_tile(tile));
   if (!(std::isfinite(radius) && radius >= 0.0))

@@ -20,9 +20,12 @@ enum class DetailKind {
   /// four times its length, and never leaves the map's range
   low_pass,
 };
-
-/// "dilation", "low_pass". [any]
-const char* to_string(DetailKind kind);
+/// As in scene files.
+template <>
+struct Names<DetailKind> {
+  static constexpr auto table =
+      std::to_array<Named<DetailKind>>({{DetailKind::dilation, "dilation"}, {DetailKind::low_pass, "low_pass"}});
+};
 
 /// How a pyramid is made.
 struct DetailSettings {

@@ -154,19 +154,6 @@ bool lies_outside(double coordinate, Wrap wrap) noexcept {
 
 }  // namespace
 
-const char* to_string(Reconstruction reconstruction) {
-  switch (reconstruction) {
-    case Reconstruction::nearest: return "nearest";
-    case Reconstruction::bilinear: return "bilinear";
-    case Reconstruction::quadratic_bspline: return "quadratic_bspline";
-  }
-  return "unknown";
-}
-
-const char* to_string(Wrap wrap) {
-  return wrap == Wrap::repeat ? "repeat" : "clamp";
-}
-
 Result<HeightMap> HeightMap::build(const Image& image, Channel channel, const HeightMapSettings& settings) {
   ASPERITY_CHECK(check(settings));
   ASPERITY_TRY(ChannelChoice choice, choose_channel(image, channel));

@@ -16,12 +16,21 @@ namespace asperity {
 ///   quadratic_bspline  C1 (height and gradient continuous); prefiltered, so it passes through every texel's height.
 ///                      It overshoots steps by up to 10 % (formulation amendment 11): see `lowest`, `highest`
 enum class Reconstruction { nearest, bilinear, quadratic_bspline };
+/// As in scene files.
+template <>
+struct Names<Reconstruction> {
+  static constexpr auto table = std::to_array<Named<Reconstruction>>({{Reconstruction::nearest, "nearest"},
+                                                                      {Reconstruction::bilinear, "bilinear"},
+                                                                      {Reconstruction::quadratic_bspline, "bspline"}});
+};
 
 /// What lies outside texture coordinates 0 to 1: the same map again, or its border continued.
 enum class Wrap { repeat, clamp };
-
-const char* to_string(Reconstruction reconstruction);  ///< stable name ("bilinear") [any]
-const char* to_string(Wrap wrap);                      ///< stable name ("repeat") [any]
+/// As in scene files.
+template <>
+struct Names<Wrap> {
+  static constexpr auto table = std::to_array<Named<Wrap>>({{Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}});
+};
 
 /// One reading of a relief.
 struct HeightSample {

@@ -74,18 +74,6 @@ int channel_index(const Image& image, Channel channel) {
 
 }  // namespace
 
-const char* to_string(Channel channel) {
-  switch (channel) {
-    case Channel::automatic: return "automatic";
-    case Channel::luminance: return "luminance";
-    case Channel::red: return "red";
-    case Channel::green: return "green";
-    case Channel::blue: return "blue";
-    case Channel::alpha: return "alpha";
-  }
-  return "unknown";
-}
-
 Status validate(const Image& image) {
   const auto bad = [](std::string what, std::string accepted) {
     return Status(Error{ErrorCode::bad_value, std::move(what), "", "", std::move(accepted)});

@@ -43,9 +43,16 @@ struct Image {
 /// Which number of a pixel is meant. `luminance` is 0.2126 R + 0.7152 G + 0.0722 B of the stored values (no gamma:
 /// heights are data, not light), or the grey channel. `automatic` asks `choose_channel` to find the height.
 enum class Channel { automatic, luminance, red, green, blue, alpha };
-
-/// Stable name, as used in scene files ("luminance"). [any]
-const char* to_string(Channel channel);
+/// As in scene files.
+template <>
+struct Names<Channel> {
+  static constexpr auto table = std::to_array<Named<Channel>>({{Channel::automatic, "automatic"},
+                                                               {Channel::luminance, "luminance"},
+                                                               {Channel::red, "red"},
+                                                               {Channel::green, "green"},
+                                                               {Channel::blue, "blue"},
+                                                               {Channel::alpha, "alpha"}});
+};
 
 /// The channel that is read, and why.
 struct ChannelChoice {

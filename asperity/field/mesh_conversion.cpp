@@ -364,19 +364,11 @@ class Converter {
   double largest_correction_ = 0.0;
 };
 
-constexpr const char* rule_names[] = {"automatic", "flood", "winding", "shell"};
-
 }  // namespace
 
-const char* to_string(InsideRule rule) {
-  return rule_names[static_cast<std::size_t>(rule)];
-}
-
 Result<InsideRule> parse_inside_rule(std::string_view name) {
-  for (std::size_t n = 0; n < std::size(rule_names); ++n) {
-    if (name == rule_names[n]) return static_cast<InsideRule>(n);
-  }
-  return bad_conversion({}, fmt::format("is \"{}\"", name), "\"automatic\", \"flood\", \"winding\" or \"shell\"");
+  if (const std::optional<InsideRule> rule = value_named<InsideRule>(name)) return *rule;
+  return bad_conversion({}, fmt::format("is \"{}\"", name), name_list<InsideRule>("\"", " or "));
 }
 
 void register_mesh_voxelizer(MeshVoxelizer voxelizer) {

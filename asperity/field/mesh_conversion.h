@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/core/progress.h"
 #include "asperity/field/sparse_grid.h"
 #include "asperity/geometry/triangle_index.h"
@@ -17,8 +18,14 @@ enum class InsideRule : std::uint8_t {
   winding,    ///< inside is where the generalised winding number exceeds 1/2 (Jacobson et al. 2013): bridges holes
   shell,      ///< no inside: the potential is the distance less half the shell's thickness
 };
-/// "automatic", "flood", "winding", "shell". [any]
-const char* to_string(InsideRule rule);
+/// As in scene files and options.
+template <>
+struct Names<InsideRule> {
+  static constexpr auto table = std::to_array<Named<InsideRule>>({{InsideRule::automatic, "automatic"},
+                                                                  {InsideRule::flood, "flood"},
+                                                                  {InsideRule::winding, "winding"},
+                                                                  {InsideRule::shell, "shell"}});
+};
 /// Errors: bad_value listing the names. [any]
 Result<InsideRule> parse_inside_rule(std::string_view name);
 

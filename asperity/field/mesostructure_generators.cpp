@@ -15,19 +15,18 @@ namespace {
 
 struct Kind {
   MesostructureKind kind;
-  const char* name;
   const char* paper;
   std::array<std::string_view, 7> parameters;  // as many as are not empty
 };
 constexpr std::array<Kind, 8> kinds{{
-    {MesostructureKind::flat, "flat", "H_0", {}},
-    {MesostructureKind::serrated, "serrated", "H_1", {"count", "wall"}},
-    {MesostructureKind::beams, "beams", "H_2", {"count", "width"}},
-    {MesostructureKind::rings, "rings", "H_3", {"number", "seed"}},
-    {MesostructureKind::warts, "warts", "H_4", {"number", "radius", "seed"}},
-    {MesostructureKind::coins, "coins", "H_5", {"number", "radius", "rim", "field", "flank", "overlap", "seed"}},
-    {MesostructureKind::groove, "groove", "H_6", {"width", "flank", "radius"}},
-    {MesostructureKind::fractal, "fractal", "H_7", {"hurst", "octaves", "seed"}},
+    {MesostructureKind::flat, "H_0", {}},
+    {MesostructureKind::serrated, "H_1", {"count", "wall"}},
+    {MesostructureKind::beams, "H_2", {"count", "width"}},
+    {MesostructureKind::rings, "H_3", {"number", "seed"}},
+    {MesostructureKind::warts, "H_4", {"number", "radius", "seed"}},
+    {MesostructureKind::coins, "H_5", {"number", "radius", "rim", "field", "flank", "overlap", "seed"}},
+    {MesostructureKind::groove, "H_6", {"width", "flank", "radius"}},
+    {MesostructureKind::fractal, "H_7", {"hurst", "octaves", "seed"}},
 }};
 
 Error refusal(std::string what, std::string place, std::string accepted) {
@@ -137,8 +136,8 @@ Result<MesostructureKind> parse_mesostructure_kind(std::string_view name) {
   std::string accepted;
   for (const Kind& entry : kinds) {
     const std::string short_name{'h', entry.paper[2]};
-    if (name == entry.name || name == entry.paper || name == short_name) return entry.kind;
-    accepted += fmt::format("{}{} ({})", accepted.empty() ? "" : ", ", entry.name, entry.paper);
+    if (name == to_string(entry.kind) || name == entry.paper || name == short_name) return entry.kind;
+    accepted += fmt::format("{}{} ({})", accepted.empty() ? "" : ", ", to_string(entry.kind), entry.paper);
   }
   return Error{ErrorCode::bad_value, fmt::format("no mesostructure is called '{}'", name), "", "", std::move(accepted)};
 }

@@ -45,6 +45,18 @@ enum class MesostructureKind {
   /// coarsest with two cells a side. The lowest valley is at 0, the highest peak at the amplitude.
   fractal,
 };
+/// As in scene files, beside the papers' own (paper_name).
+template <>
+struct Names<MesostructureKind> {
+  static constexpr auto table = std::to_array<Named<MesostructureKind>>({{MesostructureKind::flat, "flat"},
+                                                                         {MesostructureKind::serrated, "serrated"},
+                                                                         {MesostructureKind::beams, "beams"},
+                                                                         {MesostructureKind::rings, "rings"},
+                                                                         {MesostructureKind::warts, "warts"},
+                                                                         {MesostructureKind::coins, "coins"},
+                                                                         {MesostructureKind::groove, "groove"},
+                                                                         {MesostructureKind::fractal, "fractal"}});
+};
 
 /// Smallest and largest of something (shares of the tile).
 struct ShareRange {

@@ -12,6 +12,12 @@ namespace asperity {
 
 /// Which way the green channel of a normal map points: up the image (+t, OpenGL) or down it (-t, DirectX).
 enum class GreenConvention { up, down };
+/// As in scene files.
+template <>
+struct Names<GreenConvention> {
+  static constexpr auto table =
+      std::to_array<Named<GreenConvention>>({{GreenConvention::up, "up"}, {GreenConvention::down, "down"}});
+};
 /// How a normal is found between texel centres; `bilinear` is renormalised.
 enum class NormalFilter { nearest, bilinear };
 

@@ -1,9 +1,10 @@
 #include "asperity/field/scalar_field.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
+
+#include "asperity/core/identity.h"
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 
@@ -11,42 +12,34 @@ namespace {
 
 constexpr std::uint32_t leaf_cells = 4;
 
-std::uint64_t next_field_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
-
-/// Least and greatest sample that the cells of each leaf need, for leaves of layers [first, last).
+/// Least and greatest sample that the cells of each leaf need, for the leaves of layer k.
 template <class T>
 void leaf_ranges(const ScalarGrid& grid, const std::vector<T>& samples, std::uint32_t ring,
-                 const std::array<std::uint32_t, 3>& leaves, std::uint32_t first, std::uint32_t last,
-                 std::vector<ValueRange>& ranges) {
+                 const std::array<std::uint32_t, 3>& leaves, std::uint32_t k, std::vector<ValueRange>& ranges) {
   std::uint32_t size[3];
   for (std::size_t a = 0; a < 3; ++a) size[a] = grid.axis(a).size();
   const auto from = [&](std::uint32_t leaf) { return leaf * leaf_cells - std::min(leaf * leaf_cells, ring); };
   const auto to = [&](std::uint32_t leaf, std::size_t a) {
     return std::min(size[a] - 1, (leaf + 1) * leaf_cells + ring);
   };
-  for (std::uint32_t k = first; k < last; ++k) {
-    for (std::uint32_t z = from(k); z <= to(k, 2); ++z) {
-      for (std::uint32_t j = 0; j < leaves[1]; ++j) {
-        for (std::uint32_t y = from(j); y <= to(j, 1); ++y) {
-          const T* row = samples.data() + grid.index(0, y, z);
-          for (std::uint32_t i = 0; i < leaves[0]; ++i) {
-            ValueRange& range =
-                ranges[i + static_cast<std::size_t>(leaves[0]) * (j + static_cast<std::size_t>(leaves[1]) * k)];
-            float low = range.lower;
-            float high = range.upper;
-            const std::uint32_t end = to(i, 0);
-            for (std::uint32_t x = from(i); x <= end; ++x) {
-              // Comparisons with what is not a number are false: it is left out.
-              const auto value = static_cast<float>(row[x]);
-              low = value < low ? value : low;
-              high = value > high ? value : high;
-            }
-            range.lower = low;
-            range.upper = high;
+  for (std::uint32_t z = from(k); z <= to(k, 2); ++z) {
+    for (std::uint32_t j = 0; j < leaves[1]; ++j) {
+      for (std::uint32_t y = from(j); y <= to(j, 1); ++y) {
+        const T* row = samples.data() + grid.index(0, y, z);
+        for (std::uint32_t i = 0; i < leaves[0]; ++i) {
+          ValueRange& range =
+              ranges[i + static_cast<std::size_t>(leaves[0]) * (j + static_cast<std::size_t>(leaves[1]) * k)];
+          float low = range.lower;
+          float high = range.upper;
+          const std::uint32_t end = to(i, 0);
+          for (std::uint32_t x = from(i); x <= end; ++x) {
+            // Comparisons with what is not a number are false: it is left out.
+            const auto value = static_cast<float>(row[x]);
+            low = value < low ? value : low;
+            high = value > high ? value : high;
           }
+          range.lower = low;
+          range.upper = high;
         }
       }
     }
@@ -58,18 +51,13 @@ MinMaxOctree build_octree(const ScalarGrid& grid, CellReconstruction reconstruct
   for (std::size_t a = 0; a < 3; ++a) leaves[a] = (grid.axis(a).cells() + leaf_cells - 1) / leaf_cells;
   std::vector<ValueRange> ranges(static_cast<std::size_t>(leaves[0]) * leaves[1] * leaves[2]);
   const std::uint32_t ring = reconstruction == CellReconstruction::smooth ? 1 : 0;
-  const unsigned threads =
-      grid.size() > 1000000 ? std::min({std::max(1U, std::thread::hardware_concurrency()), 8U, leaves[2]}) : 1U;
-  const auto work = [&](unsigned part) {
-    const std::uint32_t first = leaves[2] * part / threads;
-    const std::uint32_t last = leaves[2] * (part + 1) / threads;
-    std::visit([&](const auto& samples) { leaf_ranges(grid, samples, ring, leaves, first, last, ranges); },
-               grid.samples());
+  // Below this, starting threads takes longer than it saves.
+  constexpr std::size_t parallel_samples = 1000000;
+  const auto layer = [&](const auto& samples, std::size_t k) {
+    leaf_ranges(grid, samples, ring, leaves, static_cast<std::uint32_t>(k), ranges);
   };
-  std::vector<std::thread> others;
-  for (unsigned part = 1; part < threads; ++part) others.emplace_back(work, part);
-  work(0);
-  for (std::thread& other : others) other.join();
+  parallel_for(leaves[2], {.threads = grid.size() > parallel_samples ? 0U : 1U},
+               [&](std::size_t k) { std::visit([&](const auto& samples) { layer(samples, k); }, grid.samples()); });
   return MinMaxOctree::build(leaves, leaf_cells, std::move(ranges));
 }
 
@@ -133,7 +121,7 @@ ScalarField::ScalarField(std::shared_ptr<const SparseGrid> sparse, CellReconstru
 }
 
 void ScalarField::finish() {
-  identity_ = next_field_identity();
+  identity_ = next_identity();
   const GridAxes& finest = axes();
   for (int a = 0; a < 3; ++a) {
     bounds_.lower[a] = finest[static_cast<std::size_t>(a)].front();

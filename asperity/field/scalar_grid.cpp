@@ -7,15 +7,6 @@
 
 namespace asperity {
 
-const char* to_string(SampleType type) {
-  switch (type) {
-    case SampleType::float32: return "float32";
-    case SampleType::int16: return "int16";
-    case SampleType::uint8: break;
-  }
-  return "uint8";
-}
-
 std::size_t sample_bytes(SampleType type) {
   switch (type) {
     case SampleType::float32: return 4;

@@ -7,14 +7,19 @@
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 #include "asperity/field/grid_axis.h"
 
 namespace asperity {
 
 /// How samples are stored.
 enum class SampleType : std::uint8_t { float32, int16, uint8 };
-/// "float32", "int16", "uint8". [any]
-const char* to_string(SampleType type);
+/// As in files.
+template <>
+struct Names<SampleType> {
+  static constexpr auto table = std::to_array<Named<SampleType>>(
+      {{SampleType::float32, "float32"}, {SampleType::int16, "int16"}, {SampleType::uint8, "uint8"}});
+};
 /// Bytes of one sample. [any]
 std::size_t sample_bytes(SampleType type);
 

@@ -210,28 +210,12 @@ CellJet noise_at(const Vec3& cells, std::uint64_t key) noexcept {
 
 }  // namespace
 
-const char* to_string(SolidKind kind) {
-  switch (kind) {
-    case SolidKind::waves: return "waves";
-    case SolidKind::lattice: return "lattice";
-    case SolidKind::rings: return "rings";
-    case SolidKind::noise: return "noise";
-    case SolidKind::pulse: return "pulse";
-  }
-  return "unknown";
-}
-
 Result<SolidKind> parse_solid_kind(const std::string& name) {
-  std::vector<std::string> names;
-  for (const SolidKind kind :
-       {SolidKind::waves, SolidKind::lattice, SolidKind::rings, SolidKind::noise, SolidKind::pulse}) {
-    if (name == to_string(kind)) return kind;
-    names.emplace_back(to_string(kind));
-  }
-  const std::string meant = nearest_name(name, names);
+  if (const std::optional<SolidKind> kind = value_named<SolidKind>(name)) return *kind;
+  const std::string meant = nearest_name(name, all_names<SolidKind>());
   return refusal(fmt::format("no solid mesostructure is called '{}'{}", name,
                              meant.empty() ? std::string() : fmt::format(", did you mean '{}'?", meant)),
-                 "", fmt::format("{}", fmt::join(names, ", ")));
+                 "", name_list<SolidKind>());
 }
 
 Result<SolidMesostructure> SolidMesostructure::build(const SolidSpec& spec) {

@@ -34,9 +34,16 @@ enum class SolidKind : std::uint8_t {
   /// beat
   pulse,
 };
+/// As in scene files.
+template <>
+struct Names<SolidKind> {
+  static constexpr auto table = std::to_array<Named<SolidKind>>({{SolidKind::waves, "waves"},
+                                                                 {SolidKind::lattice, "lattice"},
+                                                                 {SolidKind::rings, "rings"},
+                                                                 {SolidKind::noise, "noise"},
+                                                                 {SolidKind::pulse, "pulse"}});
+};
 
-/// "waves", "lattice", "rings", "noise", "pulse". [any]
-const char* to_string(SolidKind kind);
 /// The kind of this name. Errors: bad_value (with the one probably meant). [build]
 Result<SolidKind> parse_solid_kind(const std::string& name);
 

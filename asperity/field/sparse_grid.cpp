@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
@@ -15,11 +16,6 @@ constexpr int apron_side = SparseGrid::brick_side;
 constexpr int material_side = block_side + 1;
 constexpr std::size_t material_points = material_side * material_side * material_side;
 constexpr std::size_t most_table = std::size_t{1} << 27;  // 4,096 voxels a side, some 2 GB
-
-std::uint64_t next_grid_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 Error bad_grid(std::string place, std::string what, std::string accepted) {
   return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
@@ -195,7 +191,7 @@ void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::
 }
 
 void SparseGrid::finish() {
-  identity_ = next_grid_identity();
+  identity_ = next_identity();
   lowest_ = highest_ = bricks_.front()->value[apron_index(0, 0, 0)];
   has_faces_ = true;
   has_materials_ = false;

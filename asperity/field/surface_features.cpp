@@ -1,7 +1,6 @@
 #include "asperity/field/surface_features.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -28,19 +27,18 @@ constexpr int most_side = 1 << 14;            // of a baked map
 
 struct FeatureEntry {
   FeatureKind kind;
-  const char* name;
   std::vector<std::string> parameters;
 };
 
 const std::vector<FeatureEntry>& feature_table() {
   static const std::vector<FeatureEntry> all{
-      {FeatureKind::grating, "grating", {"amplitude", "wavelength", "direction", "phase"}},
-      {FeatureKind::circular_grating, "circular-grating", {"amplitude", "wavelength", "phase", "centre"}},
-      {FeatureKind::grid, "grid", {"amplitude", "wavelength", "direction"}},
-      {FeatureKind::triangular, "triangular", {"amplitude", "wavelength", "direction", "phase"}},
-      {FeatureKind::serrated, "serrated", {"amplitude", "wavelength", "direction", "phase", "wall"}},
-      {FeatureKind::noise, "noise", {"roughness", "correlation_length", "seed", "period"}},
-      {FeatureKind::map, "map", {"wavelength", "direction", "heights"}},
+      {FeatureKind::grating, {"amplitude", "wavelength", "direction", "phase"}},
+      {FeatureKind::circular_grating, {"amplitude", "wavelength", "phase", "centre"}},
+      {FeatureKind::grid, {"amplitude", "wavelength", "direction"}},
+      {FeatureKind::triangular, {"amplitude", "wavelength", "direction", "phase"}},
+      {FeatureKind::serrated, {"amplitude", "wavelength", "direction", "phase", "wall"}},
+      {FeatureKind::noise, {"roughness", "correlation_length", "seed", "period"}},
+      {FeatureKind::map, {"wavelength", "direction", "heights"}},
   };
   return all;
 }
@@ -244,7 +242,7 @@ Status SurfaceFeature::prepare_noise() {
 
 Result<SurfaceFeature> SurfaceFeature::build(const FeatureSpec& spec) {
   if (static_cast<std::size_t>(spec.kind) >= feature_table().size())
-    return feature_refusal("is unknown", "kind", fmt::format("{}", fmt::join(feature_names(), ", ")));
+    return feature_refusal("is unknown", "kind", name_list<FeatureKind>());
   ASPERITY_CHECK(check_shape(spec));
   SurfaceFeature feature;
   feature.spec_ = spec;
@@ -377,26 +375,19 @@ std::size_t SurfaceFeature::memory_bytes() const noexcept {
 }
 
 const char* feature_name(FeatureKind kind) {
-  return kind_of(kind).name;
+  return to_string(kind);
 }
 
 const std::vector<std::string>& feature_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all;
-    for (const FeatureEntry& kind : feature_table()) all.emplace_back(kind.name);
-    return all;
-  }();
-  return names;
+  return all_names<FeatureKind>();
 }
 
 Result<FeatureKind> feature_by_name(std::string_view name) {
-  for (const FeatureEntry& kind : feature_table()) {
-    if (name == kind.name) return kind.kind;
-  }
+  if (const std::optional<FeatureKind> kind = value_named<FeatureKind>(name)) return *kind;
   const std::string near = nearest_name(name, feature_names());
   return feature_refusal(
       fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)), "kind",
-      fmt::format("{}", fmt::join(feature_names(), ", ")));
+      name_list<FeatureKind>());
 }
 
 const std::vector<std::string>& feature_parameters(FeatureKind kind) {
@@ -416,12 +407,7 @@ FeatureScale scale_of(double wavelength, const FeatureScales& scales) noexcept {
 }
 
 const char* scale_name(FeatureScale scale) {
-  switch (scale) {
-    case FeatureScale::friction: return "friction";
-    case FeatureScale::texture: return "texture";
-    case FeatureScale::shape: return "geometry";
-  }
-  return "texture";
+  return to_string(scale);
 }
 
 Result<HeightMap> bake(const std::vector<SurfaceFeature>& features, const Vec2& lower, const Vec2& upper, int columns,

@@ -24,6 +24,17 @@ enum class FeatureKind : std::uint8_t {
   noise,       ///< a random surface, smooth and Gaussian, of a given roughness and correlation length
   map,         ///< a height map, one repeat of which is `wavelength` in size
 };
+/// As in scene files.
+template <>
+struct Names<FeatureKind> {
+  static constexpr auto table = std::to_array<Named<FeatureKind>>({{FeatureKind::grating, "grating"},
+                                                                   {FeatureKind::circular_grating, "circular-grating"},
+                                                                   {FeatureKind::grid, "grid"},
+                                                                   {FeatureKind::triangular, "triangular"},
+                                                                   {FeatureKind::serrated, "serrated"},
+                                                                   {FeatureKind::noise, "noise"},
+                                                                   {FeatureKind::map, "map"}});
+};
 
 /// One feature. A member that a kind does not take (feature_parameters) is left at its default.
 struct FeatureSpec {
@@ -117,6 +128,12 @@ enum class FeatureScale : std::uint8_t {
   friction,  ///< microns: felt as friction
   texture,   ///< up to some millimetres: felt as texture force
   shape,     ///< larger: part of the geometry
+};
+/// As in scene files.
+template <>
+struct Names<FeatureScale> {
+  static constexpr auto table = std::to_array<Named<FeatureScale>>(
+      {{FeatureScale::friction, "friction"}, {FeatureScale::texture, "texture"}, {FeatureScale::shape, "geometry"}});
 };
 /// Limits of the middle class (m).
 struct FeatureScales {

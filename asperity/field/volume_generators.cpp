@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <thread>
 #include <utility>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 namespace {
@@ -19,16 +19,15 @@ constexpr std::uint32_t most_nodes = 4096;
 
 struct VolumeEntry {
   VolumeKind kind;
-  const char* name;
   std::array<std::string_view, 5> parameters;  // as many as are not empty
 };
 constexpr std::array<VolumeEntry, 6> volume_table{{
-    {VolumeKind::cavity, "cavity", {"speed", "strength", "thickness", "wavelength", "time"}},
-    {VolumeKind::sphere, "sphere", {"radius"}},
-    {VolumeKind::shells, "shells", {"count", "thickness", "wavelength"}},
-    {VolumeKind::ramp, "ramp", {"gradient", "amplitude"}},
-    {VolumeKind::waves, "waves", {"amplitude", "wavelength"}},
-    {VolumeKind::gyroid, "gyroid", {"wavelength"}},
+    {VolumeKind::cavity, {"speed", "strength", "thickness", "wavelength", "time"}},
+    {VolumeKind::sphere, {"radius"}},
+    {VolumeKind::shells, {"count", "thickness", "wavelength"}},
+    {VolumeKind::ramp, {"gradient", "amplitude"}},
+    {VolumeKind::waves, {"amplitude", "wavelength"}},
+    {VolumeKind::gyroid, {"wavelength"}},
 }};
 
 Status above_zero(double value, const char* place, const char* unit) {
@@ -66,22 +65,13 @@ double shortest_edge(const Vec3& extent) {
   return extent.minCoeff();
 }
 
-/// `layer(k)` for every layer of nodes along z, on two threads; the calling one reports.
+/// `layer(k)` for every layer of nodes along z, on all cores where that pays.
 template <class Layer>
 void for_all_layers(std::uint32_t layers, std::size_t nodes, std::string_view what, const Progress& progress,
                     const Layer& layer) {
-  std::atomic<std::uint32_t> next{0};
-  const auto work = [&](bool report) {
-    for (std::uint32_t k = next.fetch_add(1); k < layers; k = next.fetch_add(1)) {
-      if (report && progress) progress(what, static_cast<double>(k) / layers);
-      layer(k);
-    }
-  };
   constexpr std::size_t parallel_nodes = std::size_t{1} << 18U;
-  if (nodes < parallel_nodes) return work(true);
-  std::thread helper(work, false);
-  work(true);
-  helper.join();
+  parallel_for(layers, {.threads = nodes < parallel_nodes ? 1U : 0U, .progress = &progress, .what = what},
+               [&](std::size_t k) { layer(static_cast<std::uint32_t>(k)); });
 }
 
 /// The samples in the whole range of an integer type.
@@ -157,20 +147,10 @@ std::span<const std::string_view> parameters_of(VolumeKind kind) {
   return {};
 }
 
-const char* to_string(VolumeKind kind) {
-  for (const VolumeEntry& entry : volume_table) {
-    if (entry.kind == kind) return entry.name;
-  }
-  return "unknown";
-}
-
 Result<VolumeKind> parse_volume_kind(std::string_view name) {
-  std::string accepted;
-  for (const VolumeEntry& entry : volume_table) {
-    if (name == entry.name) return entry.kind;
-    accepted += accepted.empty() ? entry.name : fmt::format(", {}", entry.name);
-  }
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in volume", name), "", "", accepted};
+  if (const std::optional<VolumeKind> kind = value_named<VolumeKind>(name)) return *kind;
+  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in volume", name), "", "",
+               name_list<VolumeKind>()};
 }
 
 VolumeGenerator completed(VolumeGenerator g) {

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/core/progress.h"
 #include "asperity/field/scalar_grid.h"
 
@@ -33,6 +34,16 @@ enum class VolumeKind : std::uint8_t {
   waves,
   /// sin X cos Y + sin Y cos Z + sin Z cos X, X = 2 pi x / wavelength: the gyroid at threshold 0.
   gyroid,
+};
+/// As in scene files and options.
+template <>
+struct Names<VolumeKind> {
+  static constexpr auto table = std::to_array<Named<VolumeKind>>({{VolumeKind::cavity, "cavity"},
+                                                                  {VolumeKind::sphere, "sphere"},
+                                                                  {VolumeKind::shells, "shells"},
+                                                                  {VolumeKind::ramp, "ramp"},
+                                                                  {VolumeKind::waves, "waves"},
+                                                                  {VolumeKind::gyroid, "gyroid"}});
 };
 
 /// What to generate. A member that a kind does not take (parameters_of) is ignored; one without a value stands for the
@@ -68,8 +79,6 @@ struct VolumeGenerator {
 /// Names of the members besides kind, size, extent, stretch and type that a kind takes; scene files call them the same.
 /// [any]
 std::span<const std::string_view> parameters_of(VolumeKind kind);
-/// "cavity", "sphere", ... [any]
-const char* to_string(VolumeKind kind);
 /// Errors: bad_value, listing the names. [build]
 Result<VolumeKind> parse_volume_kind(std::string_view name);
 /// The generator with its kind's own values where it has none. [any]

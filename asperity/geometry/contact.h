@@ -2,11 +2,17 @@
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 
 namespace asperity {
 
 /// Which side of a sheet can be touched. `front` is the side the normals point to.
 enum class Sides : std::uint8_t { both, front };
+/// As in scene files.
+template <>
+struct Names<Sides> {
+  static constexpr auto table = std::to_array<Named<Sides>>({{Sides::front, "front"}, {Sides::both, "both"}});
+};
 
 /// A place where a probe touches, or the place of a surface nearest to a point.
 struct Foot {

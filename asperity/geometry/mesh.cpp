@@ -229,6 +229,25 @@ void add_notes(const MeshReport& report, std::size_t unused_vertices, std::vecto
   note(unused_vertices, "vertices that no triangle uses left out");
 }
 
+/// One number for all that a mesh is made of.
+std::uint64_t fingerprint_of(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                             std::span<const std::array<Vec2f, 3>> corner_uvs) {
+  std::uint64_t sum = mixed_bits(positions.size() + (triangles.size() << 32U) + corner_uvs.size());
+  const auto take = [&](std::uint64_t bits) { sum = mixed_bits(std::rotl(sum, 5) + bits); };
+  for (const Vec3& p : positions) {
+    for (int a = 0; a < 3; ++a) take(std::bit_cast<std::uint64_t>(p[a]));
+  }
+  for (const Triangle& t : triangles) {
+    take(t[0] | std::uint64_t{t[1]} << 32U);
+    take(t[2]);
+  }
+  for (const std::array<Vec2f, 3>& uvs : corner_uvs) {
+    for (const Vec2f& uv : uvs)
+      take(std::bit_cast<std::uint32_t>(uv.x()) | std::uint64_t{std::bit_cast<std::uint32_t>(uv.y())} << 32U);
+  }
+  return sum;
+}
+
 }  // namespace
 
 /// Walks the edges vertex by vertex: the edges at one vertex are few and lie together in memory, so that sorting them
@@ -339,6 +358,7 @@ void TriangleMesh::derive(MeshSource source, bool orient_outward) {
     static_cast<void>(measure_faces(sums));
     topology->notes.emplace_back("normals pointed inward: all triangles were flipped");
   }
+  topology->fingerprint = fingerprint_of(positions_, topology->triangles, topology->corner_uvs);
 }
 
 /// Answers whether some triangle may have lost its area.

@@ -92,6 +92,9 @@ class TriangleMesh {
   [[nodiscard]] double mean_edge() const noexcept { return report_.mean_edge; }
   /// Whether the two have the same triangles in common: one is the other, its copy or moved. [any]
   [[nodiscard]] bool same_topology(const TriangleMesh& other) const noexcept { return topology_ == other.topology_; }
+  /// Tells meshes apart by what they were built from: triangles, texture coordinates and the positions of then. Copies
+  /// and moved ones keep it, and meshes built twice from the same have the same. [any]
+  [[nodiscard]] std::uint64_t fingerprint() const noexcept { return topology_->fingerprint; }
   /// Bytes held by this object, its arrays included; what it shares with moved ones too.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
   /// What the reader or the builder changed, for `inspect`.
@@ -114,6 +117,7 @@ class TriangleMesh {
     std::vector<std::uint32_t> vertex_faces;
     std::vector<OddEdge> odd_edges;
     std::vector<std::string> notes;
+    std::uint64_t fingerprint = 0;
   };
   class EdgeSurvey;
 

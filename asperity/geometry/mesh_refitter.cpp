@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <system_error>
-#include <thread>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 
@@ -13,22 +13,6 @@ namespace {
 constexpr std::size_t worth_a_thread = 20000;
 // More snapshots than this in use at a time are left to their readers to free.
 constexpr std::size_t most_buffers = 4;
-
-/// Runs both, side by side where that is asked for and a thread is to be had.
-template <class One, class Other>
-void run_both(bool side_by_side, const One& one, const Other& other) {
-  std::thread beside;
-  if (side_by_side) {
-    try {
-      beside = std::thread(one);
-    } catch (const std::system_error&) {
-      // No thread to be had: one after the other.
-    }
-  }
-  if (!beside.joinable()) one();
-  other();
-  if (beside.joinable()) beside.join();
-}
 
 }  // namespace
 
@@ -63,9 +47,14 @@ Result<TriangleIndex> MeshRefitter::moved(std::span<const Vec3> positions) {
   Status measured = success();
   if (auto* bvh = std::get_if<Bvh>(&inside->structure);
       bvh != nullptr && std::holds_alternative<Bvh>(rest_.inside_->structure)) {
-    run_both(
-        threads_ > 1 && mesh.triangles().size() >= worth_a_thread, [&] { bvh->refit(mesh, fitting_); },
-        [&] { measured = mesh.measure(sums_); });
+    const unsigned threads = threads_ > 1 && mesh.triangles().size() >= worth_a_thread ? 2U : 1U;
+    parallel_for(2, {.threads = threads}, [&](std::size_t part) {
+      if (part == 0) {
+        bvh->refit(mesh, fitting_);
+      } else {
+        measured = mesh.measure(sums_);
+      }
+    });
     ASPERITY_CHECK(std::move(measured));
   } else {
     ASPERITY_CHECK(mesh.measure(sums_));

@@ -1,8 +1,9 @@
 #include "asperity/geometry/triangle_index.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
@@ -13,10 +14,6 @@ constexpr double long_motion_in_edges = 12.0;
 constexpr double patch_slack_in_edges = 4.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
-std::uint64_t next_index_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 void gather_from(const Bvh& bvh, const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) noexcept {
   bvh.gather(centre, reach, owner, patch);
@@ -47,7 +44,7 @@ void along(const TriangleOctree& octree, const Segment& motion, double radius, V
 }  // namespace
 
 TriangleIndex::TriangleIndex(std::shared_ptr<const Inside> inside, std::uint64_t lineage)
-    : inside_(std::move(inside)), identity_(next_index_identity()), lineage_(lineage) {
+    : inside_(std::move(inside)), identity_(next_identity()), lineage_(lineage) {
   if (lineage_ == 0) lineage_ = identity_;
   tolerance_ = ContactTolerance::of(mesh().mean_edge(), mesh().bounds());
 }

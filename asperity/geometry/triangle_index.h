@@ -3,6 +3,7 @@
 #include <memory>
 #include <variant>
 
+#include "asperity/core/names.h"
 #include "asperity/geometry/bvh.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/octree.h"
@@ -13,6 +14,12 @@ namespace asperity {
 
 /// Which structure answers the elementary queries.
 enum class SearchStructure { bvh, octree };
+/// As in scene files.
+template <>
+struct Names<SearchStructure> {
+  static constexpr auto table =
+      std::to_array<Named<SearchStructure>>({{SearchStructure::bvh, "bvh"}, {SearchStructure::octree, "octree"}});
+};
 
 /// One query interface over a mesh and either search structure. Owns both mesh and structure; copies share them, so
 /// that copying costs nothing.

@@ -39,11 +39,7 @@ Box base_bounds(std::span<const Instance> instances) {
     const Box local = base != nullptr  ? base->bounds()
                       : iso != nullptr ? iso->surface_bounds()
                                        : surface_bounds(instance.surface);
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      bounds.include(instance.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
-                                                           (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
-                                                           (corner & 4U) != 0 ? local.upper.z() : local.lower.z())));
-    }
+    bounds.include(transformed(local, instance.world_from_object));
   }
   return bounds;
 }
@@ -94,13 +90,7 @@ Surface carrier_of(const Surface& surface) {
 /// What the hand can reach of the scene's bounds: strokes are laid in the workspace.
 Box in_workspace(const View& view, const Box& bounds) {
   if (view.identity()) return bounds;
-  Box out;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    out.include(view.to_workspace(Vec3((corner & 1U) != 0 ? bounds.upper.x() : bounds.lower.x(),
-                                       (corner & 2U) != 0 ? bounds.upper.y() : bounds.lower.y(),
-                                       (corner & 4U) != 0 ? bounds.upper.z() : bounds.lower.z())));
-  }
-  return out;
+  return bounds.mapped([&](const Vec3& corner) { return view.to_workspace(corner); });
 }
 
 /// A stroke as it runs through the scene.
@@ -197,14 +187,8 @@ Result<std::vector<Instance>> read_surfaces(ObjectReader& root, bool effects, Sc
 /// World bounds of the volumes that are felt without a surface.
 Box effect_bounds(std::span<const FieldEffect> effects) {
   Box bounds;
-  for (const FieldEffect& effect : effects) {
-    const Box local = effect.field->bounds();
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      bounds.include(effect.world_from_object.apply(Vec3((corner & 1U) != 0 ? local.upper.x() : local.lower.x(),
-                                                         (corner & 2U) != 0 ? local.upper.y() : local.lower.y(),
-                                                         (corner & 4U) != 0 ? local.upper.z() : local.lower.z())));
-    }
-  }
+  for (const FieldEffect& effect : effects)
+    bounds.include(transformed(effect.field->bounds(), effect.world_from_object));
   return bounds;
 }
 

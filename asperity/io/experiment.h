@@ -23,6 +23,12 @@ enum class ProbeKind {
   ideal,    ///< exactly on its stroke
   dynamic,  ///< a simulated hand holding a simulated device
 };
+/// As in scene files.
+template <>
+struct Names<ProbeKind> {
+  static constexpr auto table =
+      std::to_array<Named<ProbeKind>>({{ProbeKind::ideal, "ideal"}, {ProbeKind::dynamic, "dynamic"}});
+};
 
 /// Everything a run needs, read, built and checked. World frame, SI.
 struct Experiment {

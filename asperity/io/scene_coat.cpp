@@ -53,28 +53,20 @@ class CoatReader {
 
  private:
   void read_mapping() {
-    static const std::vector<std::string> mappings{"auto", "uv", "per_face", "triplanar"};
-    static const std::vector<std::string> wraps{"repeat", "clamp"};
-    static const std::vector<std::string> filters{"nearest", "bilinear", "bspline"};
-    switch (reader_.choice("mapping", mappings, 0)) {
-      case 1: mapping_ = Mapping::uv; break;
-      case 2: mapping_ = Mapping::per_face; break;
-      case 3: mapping_ = Mapping::triplanar; break;
-      default:
-        mapping_ = mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar;
-        if (!mesh_.has_uvs()) {
-          context_.note(
-              "coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": "
-              "\"triplanar\")");
-        }
+    const std::optional<Mapping> given = reader_.choice_or_auto<Mapping>("mapping");
+    mapping_ = given.value_or(mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar);
+    if (!given && !mesh_.has_uvs()) {
+      context_.note(
+          "coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": "
+          "\"triplanar\")");
     }
-    wrap_ = reader_.choice("wrap", wraps, 0) == 0 ? Wrap::repeat : Wrap::clamp;
-    reconstruction_ = static_cast<Reconstruction>(reader_.choice("filter", filters, 2));
+    wrap_ = reader_.choice("wrap", Wrap::repeat);
+    reconstruction_ = reader_.choice("filter", Reconstruction::quadratic_bspline);
   }
 
   Status check_amplitude(const HeightMap& heights) {
-    constexpr double remesh_share =
-        0.2;  // hrm-2010, 5.3: beyond it the rendering becomes unstable; from 15 % on: remesh
+    // hrm-2010, 5.4.1: what exceeds it is a candidate for finer remeshing. Rounding of just 15 % is not beyond it.
+    constexpr double remesh_share = 0.15 * (1.0 + 1e-9);
     const double highest = std::max(std::abs(heights.lowest()), std::abs(heights.highest()));
     const double half = 0.5 * mesh_.bounds().diagonal();
     const char* key = reader_.has("height_range") ? "height_range" : (reader_.has("height") ? "height" : "height_map");
@@ -177,10 +169,9 @@ class CoatReader {
 
   Result<Mesostructure> with_normals(HeightMap heights, const Vec2& tile) {
     if (reader_.raw("normal_map") == nullptr) return with_own_normals(std::move(heights), tile);
-    static const std::vector<std::string> greens{"up", "down"};
     reader_.refuse({"normals"}, "beside normal_map");
     const std::string name = reader_.text("normal_map", "");
-    const auto green = static_cast<GreenConvention>(reader_.choice("green", greens, 0));
+    const auto green = reader_.choice("green", GreenConvention::up);
     ASPERITY_CHECK(reader_.status());
     const std::filesystem::path path = context_.resolve(name);
     reader_.write("normal_map", path.string());

@@ -1,6 +1,7 @@
 // Device, hand and probe of a scene file.
 
 #include "asperity/io/detail/scene_reader.h"
+#include "asperity/io/experiment.h"
 
 namespace asperity {
 namespace {
@@ -103,10 +104,9 @@ Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::str
 Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place,
                                             const DeviceProfile& device, double stiffness) {
   static const SceneJson empty = SceneJson::object();
-  static const std::vector<std::string> kinds{"ideal", "dynamic"};
   ObjectReader reader(json == nullptr ? empty : *json, place, "probe");
   ProbeSettings probe;
-  probe.dynamic = reader.choice("kind", kinds, 0) == 1;
+  probe.dynamic = reader.choice("kind", ProbeKind::ideal) == ProbeKind::dynamic;
   probe.radius = reader.quantity("radius", Dimension::length, 0.0, Range::not_negative());
   probe.tip = reader.quantity("tip", Dimension::length, 0.0, Range::not_negative());
   probe.rate = reader.quantity("rate", Dimension::frequency, device.rate, Range{0.0, full_rate, true});

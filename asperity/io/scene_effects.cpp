@@ -38,13 +38,12 @@ Result<TransferFunction> read_transfer(ObjectReader& reader) {
 }
 
 Result<ScenePart<FieldEffect>> read_effect(const SceneJson& json, const std::string& place, SceneContext& context) {
-  static const std::vector<std::string> formulations{"literal", "consistent"};
   ObjectReader reader(json, place, "effect");
   ASPERITY_CHECK(reader.status());
   FieldEffect effect;
   if (!reader.has("type")) reader.fail("type", "is missing", "a kind of effect");
-  effect.kind = static_cast<FieldEffectKind>(reader.choice("type", field_effect_names(), 0));
-  const std::string kind = field_effect_names()[static_cast<std::size_t>(effect.kind)];
+  effect.kind = reader.choice("type", FieldEffectKind::viscosity);
+  const std::string kind = to_string(effect.kind);
   const bool scalars =
       effect.kind == FieldEffectKind::gravity_scalars || effect.kind == FieldEffectKind::viscosity_scalars;
   if (effect.kind != FieldEffectKind::iwata) reader.refuse({"direction"}, "by the effect \"" + kind + "\"");
@@ -55,9 +54,7 @@ Result<ScenePart<FieldEffect>> read_effect(const SceneJson& json, const std::str
   if (effect.kind == FieldEffectKind::iwata)
     effect.direction = reader.direction("direction", effect.direction).normalized();
   if (scalars) effect.value = reader.number("value", effect.value);
-  if (effect.kind == FieldEffectKind::pao)
-    effect.formulation =
-        reader.choice("formulation", formulations, 1) == 0 ? Formulation::literal : Formulation::consistent;
+  if (effect.kind == FieldEffectKind::pao) effect.formulation = reader.choice("formulation", Formulation::consistent);
   effect.largest_force = reader.quantity("largest_force", Dimension::force, effect.largest_force, Range::positive());
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));

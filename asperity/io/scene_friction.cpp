@@ -10,11 +10,6 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& friction_formulation_names() {
-  static const std::vector<std::string> names{"literal", "consistent"};
-  return names;
-}
-
 /// Reads the members that the law takes; others are refused by name.
 class FrictionReader {
  public:
@@ -28,8 +23,7 @@ class FrictionReader {
           reader_.refuse({key}, fmt::format("by the friction law \"{}\"", friction_name(law_.kind)));
       }
     }
-    if (printed_otherwise())
-      law_.formulation = static_cast<Formulation>(reader_.choice("formulation", friction_formulation_names(), 1));
+    if (printed_otherwise()) law_.formulation = reader_.choice("formulation", Formulation::consistent);
     number("stiffness", Dimension::stiffness, Range::not_negative(), law_.stiffness);
     number("damping", Dimension::damping, Range::not_negative(), law_.damping);
     number("viscosity", Dimension::damping, Range::not_negative(), law_.viscosity);
@@ -66,10 +60,9 @@ Status read_law(const SceneJson& json, ObjectReader& material, Material& into) {
   const SceneJson wrapped = json.is_string() ? SceneJson{{"law", json}} : json;
   ObjectReader reader(wrapped, material.place_of("friction"), "friction");
   if (!reader.failed() && !reader.has("law")) reader.fail("law", "is missing", "a friction law's name");
-  const std::size_t kind = reader.choice("law", friction_names(), 0);
+  const auto kind = reader.choice("law", FrictionKind::implicit_coulomb);
   ASPERITY_CHECK(reader.status());
-  ASPERITY_TRY(const FrictionKind known, friction_by_name(friction_names()[kind]));
-  into.friction = FrictionReader(reader, known).read();
+  into.friction = FrictionReader(reader, kind).read();
   into.friction_named = true;
   ASPERITY_CHECK(reader.status());
   if (auto valid = validate(into.friction); !valid) return std::move(valid).error().at(reader.place());
@@ -81,7 +74,7 @@ void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
   ObjectReader reader(json, material.place_of("lay"), "lay");
   lay.still_ratio = reader.quantity("still_ratio", Dimension::ratio, 1.0, Range{0.0, 1.0});
   lay.sliding_ratio = reader.quantity("sliding_ratio", Dimension::ratio, lay.still_ratio, Range{0.0, 1.0});
-  lay.formulation = static_cast<Formulation>(reader.choice("formulation", friction_formulation_names(), 1));
+  lay.formulation = reader.choice("formulation", Formulation::consistent);
   if (reader.has("direction")) lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
   material.take("lay", std::move(reader));
 }

@@ -14,19 +14,6 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& reconstruction_names() {
-  static const std::vector<std::string> names{"trilinear", "smooth"};
-  return names;
-}
-const std::vector<std::string>& rule_names() {
-  static const std::vector<std::string> names{"automatic", "flood", "winding", "shell"};
-  return names;
-}
-const std::vector<std::string>& redistancing_names() {
-  static const std::vector<std::string> names{"none", "normalised", "redistanced"};
-  return names;
-}
-
 /// What the law reads of the potential besides its zero set (m): how far out, and how far in.
 struct Reach {
   double outside = 0.0;
@@ -83,7 +70,7 @@ ConversionSettings read_conversion(ObjectReader& reader, const Box& bounds, cons
   settings.band_outside =
       reader.optional_quantity("band_outside", Dimension::length, Range::positive()).value_or(outside);
   settings.band_inside = read_band_inside(reader, inside);
-  settings.rule = static_cast<InsideRule>(reader.choice("inside", rule_names(), 0));
+  settings.rule = reader.choice("inside", InsideRule::automatic);
   settings.shell_thickness =
       reader.optional_quantity("shell_thickness", Dimension::length, Range::positive()).value_or(0.0);
   if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
@@ -204,7 +191,6 @@ class ImplicitReader {
       : surface_(surface), reader_(reader), feel_(feel), context_(context) {}
 
   Status read(Instance& instance) {
-    static const std::vector<std::string> sides{"auto", "front", "both"};
     if (surface_.has("mesh")) ASPERITY_CHECK(read_mesh());
     const std::string file = reader_.has("file") ? reader_.text("file", "") : std::string();
     if (reader_.has("file") && file.empty()) reader_.fail("file", "is empty", "the name of a .vdb file");
@@ -223,8 +209,7 @@ class ImplicitReader {
     if (coat_) texture = {coat_height(*coat_, mesh_->mesh()), coat_->amplitude_bound()};
     if (!texture.height) reader_.refuse({"redistance"}, "without a texture or a coat");
     parts_.offset = reader_.quantity("offset", Dimension::length, 0.0, Range::not_negative());
-    parts_.reconstruction =
-        static_cast<CellReconstruction>(reader_.choice("reconstruction", reconstruction_names(), 1));
+    parts_.reconstruction = reader_.choice("reconstruction", CellReconstruction::smooth);
     ASPERITY_TRY(const std::vector<MaterialBrush> brushes, read_brushes(reader_.raw("materials"), reader_));
     for (std::size_t i = 0; i < brushes.size() && !texture.height; ++i) {
       if (std::isnan(brushes[i].material.roughness)) continue;
@@ -237,7 +222,7 @@ class ImplicitReader {
     shortest_ = texture.wavelength;
     if (texture.height) ASPERITY_CHECK(lay_texture(texture.height));
     instance.name = surface_.text("name", name_);
-    instance.sides = surface_.choice("sides", sides, 0) == 2 ? Sides::both : Sides::front;
+    instance.sides = surface_.choice_or_auto<Sides>("sides").value_or(Sides::front);
     ASPERITY_CHECK(surface_.status());
     parts_.mesh = mesh_;
     Result<ImplicitSurface> built = ImplicitSurface::build(std::move(parts_));
@@ -374,8 +359,7 @@ class ImplicitReader {
   }
 
   Status lay_texture(const PointHeight& height) {
-    const auto mode = static_cast<Redistancing>(
-        reader_.choice("redistance", redistancing_names(), static_cast<std::size_t>(Redistancing::redistanced)));
+    const auto mode = reader_.choice("redistance", Redistancing::redistanced);
     ASPERITY_CHECK(reader_.status());
     if (context_.progress) context_.progress("laying the texture", 0.0);
     Result<TexturedPotential> result = textured(*parts_.grid, height, mode, context_.progress);

@@ -13,19 +13,6 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& blend_names() {
-  static const std::vector<std::string> names{"none", "linear", "s_shape", "quintic"};
-  return names;
-}
-const std::vector<std::string>& law_formulation_names() {
-  static const std::vector<std::string> names{"literal", "consistent"};
-  return names;
-}
-const std::vector<std::string>& law_channel_names() {
-  static const std::vector<std::string> names{"automatic", "luminance", "red", "green", "blue", "alpha"};
-  return names;
-}
-
 Result<std::vector<double>> column_means(const Image& image, Channel channel) {
   ASPERITY_TRY(const ChannelChoice choice, choose_channel(image, channel));
   const std::vector<float> values = extract_channel(image, choice.channel);
@@ -42,7 +29,7 @@ Result<std::vector<double>> read_blend_map(const SceneJson& json, const std::str
   ObjectReader reader(json, place, "blend map");
   const std::string file = reader.text("image", "");
   if (!reader.failed() && file.empty()) reader.fail("image", "is missing", "an image file");
-  const auto channel = static_cast<Channel>(reader.choice("channel", law_channel_names(), 0));
+  const auto channel = reader.choice("channel", Channel::automatic);
   ASPERITY_CHECK(reader.status());
   const std::string path = context.resolve(file).string();
   ASPERITY_TRY(const Image image, read_image(path));
@@ -73,17 +60,11 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
     kind = Blend::image;
     reader.write("blend", *blend);
   } else if (blend != nullptr && !blend->is_string()) {
-    reader.fail_type("blend", *blend,
-                     "\"none\", \"linear\", \"s_shape\", \"quintic\", {\"image\": file}, or an array of weights");
+    reader.fail_type("blend", *blend, name_list<Blend>("\"") + ", {\"image\": file}, or an array of weights");
   } else {
-    kind = static_cast<Blend>(reader.choice("blend", blend_names(), static_cast<std::size_t>(kind)));
+    kind = reader.choice("blend", kind);
   }
   return reader.status();
-}
-
-const std::vector<std::string>& magnitude_names() {
-  static const std::vector<std::string> names{"distance", "potential"};
-  return names;
 }
 
 /// Refuses every option but those in `own`.
@@ -124,14 +105,14 @@ void read_virtual_contact_point(ObjectReader& reader, VirtualContactPointLaw& la
   if (law.formulation == Formulation::consistent) {
     reader.refuse({"magnitude"}, "by the consistent law \"virtual-contact-point\", which has one magnitude");
   } else {
-    law.magnitude = static_cast<ContactMagnitude>(reader.choice("magnitude", magnitude_names(), 0));
+    law.magnitude = reader.choice("magnitude", ContactMagnitude::distance);
   }
   law.depth_gain = reader.number("depth_gain", law.depth_gain, Range::not_negative());
   law.offset = reader.quantity("offset", Dimension::length, law.offset, Range::not_negative());
 }
 
 SceneJson blend_json(Blend blend, const std::vector<double>& weights) {
-  return blend == Blend::image ? SceneJson(weights) : SceneJson(blend_names()[static_cast<std::size_t>(blend)]);
+  return blend == Blend::image ? SceneJson(weights) : SceneJson(to_string(blend));
 }
 
 }  // namespace
@@ -141,11 +122,11 @@ SceneJson law_json(const Law& law) {
   SceneJson json = SceneJson::object();
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     json["type"] = "height-field";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(height_field->formulation)];
+    json["formulation"] = to_string(height_field->formulation);
     json["edge_taper"] = height_field->edge_taper;
   } else if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
     json["type"] = "mesostructure";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(meso->formulation)];
+    json["formulation"] = to_string(meso->formulation);
     if (meso->formulation == Formulation::literal) {
       json["rho"] = meso->rho;
       json["blend"] = blend_json(meso->blend, meso->blend_map);
@@ -153,28 +134,27 @@ SceneJson law_json(const Law& law) {
     }
   } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
     json["type"] = "force-shading";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(shading->formulation)];
+    json["formulation"] = to_string(shading->formulation);
   } else if (const auto* avila = std::get_if<AvilaLaw>(&law)) {
     json["type"] = "avila";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(avila->formulation)];
+    json["formulation"] = to_string(avila->formulation);
     json["band"] = avila->band;
     json["largest_force"] = avila->largest_force;
     json["retarding"] = avila->retarding;
   } else if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) {
     json["type"] = "cross-uncross";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(cross->formulation)];
+    json["formulation"] = to_string(cross->formulation);
     json["retarding"] = cross->retarding;
     if (cross->formulation == Formulation::literal) json["reach"] = cross->reach;
   } else if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) {
     json["type"] = "virtual-contact-point";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(contact->formulation)];
-    if (contact->formulation == Formulation::literal)
-      json["magnitude"] = magnitude_names()[static_cast<std::size_t>(contact->magnitude)];
+    json["formulation"] = to_string(contact->formulation);
+    if (contact->formulation == Formulation::literal) json["magnitude"] = to_string(contact->magnitude);
     json["depth_gain"] = contact->depth_gain;
     json["offset"] = contact->offset;
   } else if (const auto* magnetic = std::get_if<MagneticLaw>(&law)) {
     json["type"] = "magnetic";
-    json["formulation"] = law_formulation_names()[static_cast<std::size_t>(magnetic->formulation)];
+    json["formulation"] = to_string(magnetic->formulation);
     json["band"] = magnetic->band;
   } else {
     json["type"] = law_name(law);
@@ -215,19 +195,16 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   ASPERITY_CHECK(reader.status());
   Result<Law> law = law_by_name(type);
   if (!law) return std::move(law).error().at(place + ".type");
-  const auto formulation = [&](Formulation fallback) {
-    return static_cast<Formulation>(
-        reader.choice("formulation", law_formulation_names(), static_cast<std::size_t>(fallback)));
-  };
+  // Told by "formulation" or by a name that ends in "-literal", a form has the same options by default.
+  if (const std::optional<Formulation> named = formulation_of(*law)) {
+    *law = in_formulation(*law, reader.choice("formulation", *named));
+  }
   if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
-    meso->formulation = formulation(meso->formulation);
     ASPERITY_CHECK(read_mesostructure(reader, context, *meso));
-  } else if (auto* shading = std::get_if<ForceShadingLaw>(&*law)) {
+  } else if (std::holds_alternative<ForceShadingLaw>(*law)) {
     only(reader, {"formulation"}, "by force shading");
-    shading->formulation = formulation(shading->formulation);
   } else if (auto* height_field = std::get_if<HeightFieldLaw>(&*law)) {
     only(reader, {"formulation", "edge_taper"}, "by a height-field law");
-    height_field->formulation = formulation(height_field->formulation);
     height_field->edge_taper = reader.number("edge_taper", height_field->edge_taper, Range{0.0, 1.0 / 3.0});
   } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&*law)) {
     read_generated(reader, *generated);
@@ -235,20 +212,16 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     read_dense(reader, *dense);
   } else if (auto* avila = std::get_if<AvilaLaw>(&*law)) {
     only(reader, {"formulation", "band", "largest_force", "retarding"}, "by the law \"avila\"");
-    avila->formulation = formulation(avila->formulation);
     avila->band = reader.number("band", avila->band, Range::not_negative());
     avila->largest_force = reader.quantity("largest_force", Dimension::force, avila->largest_force, Range::positive());
     avila->retarding = reader.quantity("retarding", Dimension::damping, avila->retarding, Range::not_negative());
   } else if (auto* contact = std::get_if<VirtualContactPointLaw>(&*law)) {
-    contact->formulation = formulation(contact->formulation);
     read_virtual_contact_point(reader, *contact);
   } else if (auto* magnetic = std::get_if<MagneticLaw>(&*law)) {
     only(reader, {"formulation", "band"}, "by the law \"magnetic\"");
-    magnetic->formulation = formulation(magnetic->formulation);
     magnetic->band = reader.quantity("band", Dimension::length, magnetic->band, Range::positive());
   } else if (auto* cross = std::get_if<CrossUncrossLaw>(&*law)) {
     only(reader, {"formulation", "retarding", "reach"}, "by the law \"cross-uncross\"");
-    cross->formulation = formulation(cross->formulation);
     cross->retarding = reader.quantity("retarding", Dimension::damping, cross->retarding, Range::not_negative());
     if (cross->formulation == Formulation::consistent)
       reader.refuse({"reach"}, "by the consistent law \"cross-uncross\", which looks as far as it has to");
@@ -263,10 +236,9 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
 
 Result<Stitching> read_stitching(const SceneJson& json, const std::string& place, const SceneContext& context,
                                  ObjectReader& coat) {
-  static const std::vector<std::string> folds{"keep", "round", "fillet"};
   ObjectReader reader(json, place, "stitching");
   Stitching stitching;
-  stitching.folds = static_cast<FoldMode>(reader.choice("folds", folds, 0));
+  stitching.folds = reader.choice("folds", stitching.folds);
   stitching.rho = reader.number("rho", stitching.rho, Range{0.0, 1.0 / 3.0, true});
   if (stitching.folds == FoldMode::fillet) {
     stitching.fillet_radius =

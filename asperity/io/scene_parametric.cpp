@@ -14,10 +14,9 @@ Result<ParametricSettings> read_shape(ObjectReader& surface) {
   const SceneJson& json = *surface.raw("parametric");
   ObjectReader reader(json, surface.place_of("parametric"), "parametric");
   if (!reader.failed() && !reader.has("shape")) reader.fail("shape", "is missing", "a shape's name");
-  const std::size_t shape = reader.choice("shape", parametric_names(), 0);
-  ASPERITY_CHECK(reader.status());
   ParametricSettings settings;
-  ASPERITY_TRY(settings.shape, parametric_by_name(parametric_names()[shape]));
+  settings.shape = reader.choice("shape", ParametricShape::plane);
+  ASPERITY_CHECK(reader.status());
   const auto& taken = parametric_parameters(settings.shape);
   const auto takes = [&](const std::string& key) { return std::find(taken.begin(), taken.end(), key) != taken.end(); };
   for (const SceneObjectKeys& entry : scene_object_keys()) {
@@ -52,7 +51,6 @@ Result<ParametricSurface> build_shape(const ParametricSettings& settings, const 
 
 Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& context, Instance& instance,
                        TexturePart& texture) {
-  static const std::vector<std::string> sides{"auto", "front", "both"};
   surface.refuse(
       {"mesh", "volume", "iso", "implicit", "units", "fit", "search", "coat", "on_overlap", "shell_directions"},
       "beside a parametric surface");
@@ -62,11 +60,7 @@ Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& cont
   instance.name = surface.text("name", parametric_name(settings.shape));
   ASPERITY_CHECK(surface.status());
   ASPERITY_TRY(ParametricSurface shape, build_shape(settings, place));
-  switch (surface.choice("sides", sides, 0)) {
-    case 1: instance.sides = Sides::front; break;
-    case 2: instance.sides = Sides::both; break;
-    default: instance.sides = shape.natural_sides(); break;
-  }
+  instance.sides = surface.choice_or_auto<Sides>("sides").value_or(shape.natural_sides());
   TextureHost host;
   host.name = instance.name;
   host.bounds = shape.bounds();

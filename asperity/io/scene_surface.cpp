@@ -50,12 +50,7 @@ Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface,
 }
 
 Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& context, const std::string& name) {
-  static const std::vector<std::string> names{"auto", "front", "both"};
-  switch (surface.choice("sides", names, 0)) {
-    case 1: return Sides::front;
-    case 2: return Sides::both;
-    default: break;
-  }
+  if (const std::optional<Sides> given = surface.choice_or_auto<Sides>("sides")) return *given;
   const Sides sides = mesh.natural_sides();
   if (sides == Sides::both) {
     context.note(
@@ -69,11 +64,9 @@ Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& c
 /// The relief, with a note on what building it had to change. `place`: of what it is made from.
 Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface, SceneContext& context,
                              const std::string& name, const std::string& place) {
-  static const std::vector<std::string> cures{"cure", "refuse"};
-  static const std::vector<std::string> directions{"least_squares", "relaxed"};
   ReliefSettings settings;
-  settings.on_overlap = static_cast<OnOverlap>(surface.choice("on_overlap", cures, 0));
-  settings.directions = static_cast<ShellDirections>(surface.choice("shell_directions", directions, 0));
+  settings.on_overlap = surface.choice("on_overlap", settings.on_overlap);
+  settings.directions = surface.choice("shell_directions", settings.directions);
   ASPERITY_CHECK(surface.status());
   if (context.progress) context.progress("fitting the relief", 0.0);
   Result<ReliefSurface> relief = ReliefSurface::build(std::move(base), std::move(coat), settings);
@@ -142,12 +135,11 @@ Result<ScenePart<Coat>> read_gltf_coat(const SceneJson* json, const std::string&
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
 Status read_triangles(ObjectReader& reader, const Law& law, const Material& own, SceneContext& context,
                       Instance& instance, TexturePart& texture) {
-  static const std::vector<std::string> searches{"bvh", "octree"};
   reader.refuse({"iso"}, "without a volume");
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(MeshPart part, read_mesh_part(reader, context));
   instance.name = reader.text("name", part.name);
-  const auto search = reader.choice("search", searches, 0) == 0 ? SearchStructure::bvh : SearchStructure::octree;
+  const auto search = reader.choice("search", SearchStructure::bvh);
   ASPERITY_CHECK(reader.status());
   if (context.progress) context.progress("building the search structure", 0.0);
   const SceneJson* coat_json = reader.raw("coat");
@@ -215,12 +207,11 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
 
 /// What can be touched, of a volume: an isosurface, from either side unless the scene says otherwise.
 Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& instance) {
-  static const std::vector<std::string> sides{"auto", "front", "both"};
   reader.refuse({"mesh", "up", "search", "coat", "on_overlap", "shell_directions"}, "beside a volume");
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));
   instance.name = reader.text("name", volume.name);
-  instance.sides = reader.choice("sides", sides, 0) == 1 ? Sides::front : Sides::both;
+  instance.sides = reader.choice_or_auto<Sides>("sides").value_or(Sides::both);
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(std::shared_ptr<const IsoSurface> surface, read_iso(reader, volume, context));
   instance.surface = std::move(surface);

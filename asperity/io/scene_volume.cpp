@@ -17,11 +17,6 @@ namespace {
 
 using Samples = std::variant<ScalarGrid, VectorGrid>;
 
-const std::vector<std::string>& volume_reconstruction_names() {
-  static const std::vector<std::string> names{"trilinear", "smooth"};
-  return names;
-}
-
 /// What a volume's object says beyond where its samples come from.
 struct VolumeWords {
   std::optional<DerivedField> derive;
@@ -58,8 +53,7 @@ VolumeWords read_words(ObjectReader& reader) {
     words.part = named<VectorPart>(reader, "component", parse_vector_part);
   }
   if (words.derive && component != nullptr) reader.refuse({"component"}, "beside \"derive\"");
-  words.reconstruction = static_cast<CellReconstruction>(
-      reader.choice("reconstruction", volume_reconstruction_names(), static_cast<std::size_t>(words.reconstruction)));
+  words.reconstruction = reader.choice("reconstruction", words.reconstruction);
   return words;
 }
 
@@ -105,8 +99,7 @@ class GeneratorWords {
     if (reader_.has("strength")) generator_.strength = reader_.number("strength", generator_.strength, Range{0.0, 0.9});
     if (reader_.has("time")) generator_.time = reader_.quantity("time", Dimension::time, generator_.time);
     if (reader_.has("type")) {
-      static const std::vector<std::string> types{"float32", "int16", "uint8"};
-      generator_.type = static_cast<SampleType>(reader_.choice("type", types, 0));
+      generator_.type = reader_.choice("type", SampleType::float32);
     }
   }
 
@@ -149,10 +142,9 @@ Result<Samples> generate(ObjectReader& reader, SceneContext& context, std::strin
 
 Result<Samples> read_file(ObjectReader& reader, const VolumeWords& words, SceneContext& context,
                           const std::filesystem::path& path) {
-  static const std::vector<std::string> associations{"any", "node", "cell"};
   VolumeRequest request;
   request.array = reader.text("array", "");
-  request.association = static_cast<Association>(reader.choice("association", associations, 0));
+  request.association = reader.choice("association", Association::any);
   request.component = words.component;
   request.vectors = words.part.has_value() || (words.derive && *words.derive != DerivedField::gradient_magnitude);
   request.resample = three_counts(reader, "resample", 0);
@@ -378,12 +370,11 @@ Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context)
 Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const VolumePart& volume,
                                                    SceneContext& context) {
   static const SceneJson empty = SceneJson::object();
-  static const std::vector<std::string> insides{"low", "high"};
   const SceneJson* json = surface.raw("iso");
   ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("iso"), "iso");
   reader.write("threshold", nullptr);  // first in its canonical copy, however it is found
   const std::optional<double> given = read_threshold(reader, *volume.field);
-  const Inside inside = reader.choice("inside", insides, 1) == 0 ? Inside::low : Inside::high;
+  const auto inside = reader.choice("inside", Inside::high);
   const double speed = reader.quantity("threshold_speed", Dimension::speed, 0.02, Range::positive());
   ASPERITY_CHECK(reader.status());
   const double threshold = given ? *given : chosen_threshold(volume, context);

@@ -91,15 +91,6 @@ Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& req
 
 }  // namespace
 
-const char* to_string(Association association) {
-  switch (association) {
-    case Association::node: return "node";
-    case Association::cell: return "cell";
-    case Association::any: break;
-  }
-  return "any";
-}
-
 void register_volume_reader(VolumeReader reader) {
   registered() = reader;
 }

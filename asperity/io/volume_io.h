@@ -21,8 +21,12 @@ enum class Association : std::uint8_t {
   node,  ///< on the grid's nodes
   cell,  ///< in the cells' middles
 };
-/// "any", "node", "cell". [any]
-const char* to_string(Association association);
+/// As in scene files and options.
+template <>
+struct Names<Association> {
+  static constexpr auto table = std::to_array<Named<Association>>(
+      {{Association::any, "any"}, {Association::node, "node"}, {Association::cell, "cell"}});
+};
 
 /// What is wanted of a volume file.
 struct VolumeRequest {

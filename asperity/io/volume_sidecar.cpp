@@ -137,9 +137,8 @@ void read_places(ObjectReader& reader, Sidecar& sidecar) {
 
 /// Everything but the samples, checked against `most_bytes` before anything of their size is made.
 Result<Sidecar> read_description(std::string_view text, const std::string& name, const VolumeRequest& request) {
-  static const std::vector<std::string> types{"float32", "int16", "uint8"};
   static const std::vector<std::string> orders{"little", "big"};
-  static const std::vector<std::string> associations{"node", "cell"};
+  static const std::vector<std::string> associations{to_string(Association::node), to_string(Association::cell)};
   ASPERITY_TRY(const SceneJson json, parse_scene_json(text, name));
   ObjectReader reader(json, "", "volume's sidecar", sidecar_keys);
   if (!reader.failed() && !reader.has("asperity_volume"))
@@ -156,7 +155,7 @@ Result<Sidecar> read_description(std::string_view text, const std::string& name,
   for (const char* key : {"type", "byte_order"}) {
     if (!reader.has(key)) reader.fail(key, "is missing", "the samples' type and byte order");
   }
-  sidecar.type = static_cast<SampleType>(reader.choice("type", types, 0));
+  sidecar.type = reader.choice("type", SampleType::float32);
   sidecar.big_endian = reader.choice("byte_order", orders, 0) == 1;
   sidecar.raw.components = reader.integer("components", 1, 1, 3);
   if (sidecar.raw.components == 2) reader.fail("components", "is 2", "1 or 3");

@@ -26,6 +26,18 @@ enum class FrictionKind : std::uint8_t {
   hayward_armstrong,  ///< Dahl's law with an adhesion map: no drift (Hayward and Armstrong 2000)
   lugre,              ///< bristles with Stribeck's curve (Canudas de Wit et al. 1995)
 };
+/// As in scene files.
+template <>
+struct Names<FrictionKind> {
+  static constexpr auto table =
+      std::to_array<Named<FrictionKind>>({{FrictionKind::implicit_coulomb, "implicit-coulomb"},
+                                          {FrictionKind::viscous, "viscous"},
+                                          {FrictionKind::coulomb, "coulomb"},
+                                          {FrictionKind::karnopp, "karnopp"},
+                                          {FrictionKind::dahl, "dahl"},
+                                          {FrictionKind::hayward_armstrong, "hayward-armstrong"},
+                                          {FrictionKind::lugre, "lugre"}});
+};
 
 /// A friction law and its parameters, SI. Coefficients are the material's; what a law does not take is left at its
 /// default (validate says so).

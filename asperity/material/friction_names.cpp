@@ -16,19 +16,18 @@ namespace {
 
 struct KindEntry {
   FrictionKind kind;
-  const char* name;
   std::vector<std::string> parameters;
 };
 
 const std::array<KindEntry, 7>& kinds() {
   static const std::array<KindEntry, 7> entries{{
-      {FrictionKind::implicit_coulomb, "implicit-coulomb", {"stiffness", "damping", "break_away"}},
-      {FrictionKind::viscous, "viscous", {"viscosity"}},
-      {FrictionKind::coulomb, "coulomb", {"viscosity", "stick_speed"}},
-      {FrictionKind::karnopp, "karnopp", {"stiffness", "damping", "viscosity", "break_away", "stick_speed"}},
-      {FrictionKind::dahl, "dahl", {"stiffness", "exponent"}},
-      {FrictionKind::hayward_armstrong, "hayward-armstrong", {"stiffness", "adhesion"}},
-      {FrictionKind::lugre, "lugre", {"stiffness", "damping", "viscosity", "break_away", "stribeck_speed"}},
+      {FrictionKind::implicit_coulomb, {"stiffness", "damping", "break_away"}},
+      {FrictionKind::viscous, {"viscosity"}},
+      {FrictionKind::coulomb, {"viscosity", "stick_speed"}},
+      {FrictionKind::karnopp, {"stiffness", "damping", "viscosity", "break_away", "stick_speed"}},
+      {FrictionKind::dahl, {"stiffness", "exponent"}},
+      {FrictionKind::hayward_armstrong, {"stiffness", "adhesion"}},
+      {FrictionKind::lugre, {"stiffness", "damping", "viscosity", "break_away", "stribeck_speed"}},
   }};
   return entries;
 }
@@ -62,30 +61,18 @@ constexpr std::array<Parameter, 8> all_parameters{{
     {"adhesion", &FrictionLaw::adhesion, 0.0, false, 0.9, "0 to 0.9"},
 }};
 
-std::string listed(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
-
 }  // namespace
 
 const char* friction_name(FrictionKind kind) {
-  return entry_of(kind).name;
+  return to_string(kind);
 }
 
 const std::vector<std::string>& friction_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all;
-    for (const KindEntry& entry : kinds()) all.emplace_back(entry.name);
-    return all;
-  }();
-  return names;
+  return all_names<FrictionKind>();
 }
 
 Result<FrictionKind> friction_by_name(std::string_view name) {
-  for (const KindEntry& entry : kinds())
-    if (name == entry.name) return entry.kind;
+  if (const std::optional<FrictionKind> kind = value_named<FrictionKind>(name)) return *kind;
   const std::string near = nearest_name(name, friction_names());
   return Error{
       ErrorCode::bad_value,

@@ -3,20 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
+#include "asperity/core/identity.h"
 #include "asperity/core/suggest.h"
 #include "asperity/render/detail/iso_proxy.h"
 
 namespace asperity {
 
 namespace {
-
-std::uint64_t next_law_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 struct Registered {
   std::vector<std::string> names;
@@ -53,7 +48,7 @@ Foot TouchedSurface::closest(const Vec3& p, double bound) const noexcept {
   return std::visit([&](const auto& surface) { return surface->closest(p, bound, slot_->hint); }, instance_->surface);
 }
 
-CustomLaw::CustomLaw(std::string name) : name_(std::move(name)), identity_(next_law_identity()) {}
+CustomLaw::CustomLaw(std::string name) : name_(std::move(name)), identity_(next_identity()) {}
 
 LawForce CustomLaw::force(const Instance& instance, const Material& material, const Vec3& probe, const Vec3& velocity,
                           Seconds dt, ContactState& slot) const noexcept {

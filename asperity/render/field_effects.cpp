@@ -80,18 +80,13 @@ double TransferFunction::operator()(double value) const noexcept {
 }
 
 std::span<const std::string> field_effect_names() {
-  static const std::array<std::string, 6> names{"viscosity", "gradient",        "iwata",
-                                                "pao",       "gravity-scalars", "viscosity-scalars"};
-  return names;
+  return all_names<FieldEffectKind>();
 }
 
 Status validate(const FieldEffect& effect) {
   if (effect.field == nullptr) return bad_effect("is missing", "field", "a scalar field");
-  if (static_cast<std::size_t>(effect.kind) >= field_effect_names().size()) {
-    std::string list;
-    for (const std::string& name : field_effect_names()) list += (list.empty() ? "" : ", ") + name;
-    return bad_effect(fmt::format("is {}", static_cast<int>(effect.kind)), "kind", list);
-  }
+  if (static_cast<std::size_t>(effect.kind) >= field_effect_names().size())
+    return bad_effect(fmt::format("is {}", static_cast<int>(effect.kind)), "kind", name_list<FieldEffectKind>());
   if (effect.transfer.points().empty())
     return bad_effect("has no point", "transfer", "one point [value, answer] or more");
   for (std::size_t i = 0; i < effect.transfer.points().size(); ++i) {

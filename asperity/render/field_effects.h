@@ -39,6 +39,17 @@ enum class FieldEffectKind : std::uint8_t {
   gravity_scalars,    ///< T(|phi - value|) towards `value` along g^   T in N (Reimersdahl et al. 2003)
   viscosity_scalars,  ///< -T(|phi - value|) v                    T in N·s/m (likewise)
 };
+/// As in scene files.
+template <>
+struct Names<FieldEffectKind> {
+  static constexpr auto table =
+      std::to_array<Named<FieldEffectKind>>({{FieldEffectKind::viscosity, "viscosity"},
+                                             {FieldEffectKind::gradient, "gradient"},
+                                             {FieldEffectKind::iwata, "iwata"},
+                                             {FieldEffectKind::pao, "pao"},
+                                             {FieldEffectKind::gravity_scalars, "gravity-scalars"},
+                                             {FieldEffectKind::viscosity_scalars, "viscosity-scalars"}});
+};
 
 /// A volume that is felt wherever the probe is in it.
 struct FieldEffect {

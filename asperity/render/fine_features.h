@@ -38,6 +38,12 @@ enum class TextureSource : std::uint8_t {
   features,  ///< procedural features and maps, by the mapping
   coat,      ///< the coat of a mesh that is felt as its bare base: its heights, and its normal map in the literal form
 };
+/// As in scene files.
+template <>
+struct Names<TextureSource> {
+  static constexpr auto table =
+      std::to_array<Named<TextureSource>>({{TextureSource::features, "features"}, {TextureSource::coat, "coat"}});
+};
 
 /// A coefficient of friction by direction in the plane of the features: e M e for a unit direction e.
 struct LayMatrix {

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #include "asperity/core/suggest.h"
 #include "asperity/render/custom_law.h"
@@ -12,10 +15,51 @@ namespace asperity {
 
 namespace {
 
-template <class... Fs>
-struct Overloaded : Fs... {
-  using Fs::operator()...;
+/// What the kinds of laws are called, in the order of the variant: the one place where a built-in law is named. The
+/// last kind, a program's own, has names of its own.
+constexpr std::size_t built_in_laws = std::variant_size_v<Law> - 1;
+constexpr std::array<std::string_view, built_in_laws> law_kind_names{
+    "proxy",      "god-object", "force-shading", "height-field",          "mesostructure", "generated-geometry",
+    "dense-mesh", "avila",      "cross-uncross", "virtual-contact-point", "magnetic",      "normal-perturbation"};
+static_assert(std::none_of(law_kind_names.begin(), law_kind_names.end(), [](auto name) { return name.empty(); }));
+static_assert(std::is_same_v<std::variant_alternative_t<built_in_laws, Law>, std::shared_ptr<const CustomLaw>>);
+constexpr std::string_view literal_suffix = "-literal";
+
+template <class L>
+constexpr bool has_two_forms = requires(L law) {
+  law.formulation;
 };
+
+/// A name and what it makes.
+struct NamedLaw {
+  std::string name;
+  Law law;
+};
+
+template <std::size_t Kind>
+void add_named_laws(std::vector<NamedLaw>& all) {
+  using Made = std::variant_alternative_t<Kind, Law>;
+  const std::string name(law_kind_names[Kind]);
+  if constexpr (has_two_forms<Made>) {
+    all.push_back({name, Made{.formulation = Formulation::consistent}});
+    all.push_back({name + std::string(literal_suffix), Made{.formulation = Formulation::literal}});
+  } else {
+    all.push_back({name, Made{}});
+  }
+}
+
+/// Every built-in law by its name: what is listed is what is made.
+const std::vector<NamedLaw>& named_laws() {
+  static const std::vector<NamedLaw> laws = [] {
+    std::vector<NamedLaw> all;
+    [&]<std::size_t... Kind>(std::index_sequence<Kind...>) {
+      (add_named_laws<Kind>(all), ...);
+    }
+    (std::make_index_sequence<built_in_laws>());
+    return all;
+  }();
+  return laws;
+}
 
 Error option_error(std::string option, double value, std::string accepted) {
   return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, std::move(option), std::move(accepted)};
@@ -64,74 +108,52 @@ Status validate_virtual_contact_point(const VirtualContactPointLaw& law) {
 }  // namespace
 
 std::string law_name(const Law& law) {
-  const auto suffix = [](Formulation f) { return f == Formulation::literal ? std::string("-literal") : std::string(); };
+  if (law.index() >= built_in_laws) return custom_of(law) == nullptr ? std::string("custom") : custom_of(law)->name();
+  std::string name(law_kind_names[law.index()]);
+  if (formulation_of(law) == Formulation::literal) name += literal_suffix;
+  return name;
+}
+
+const std::vector<std::string>& law_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const NamedLaw& named : named_laws()) all.push_back(named.name);
+    return all;
+  }();
+  return names;
+}
+
+std::optional<Formulation> formulation_of(const Law& law) {
   return std::visit(
-      Overloaded{
-          [](const ProxyLaw&) { return std::string("proxy"); },
-          [](const GodObjectLaw&) { return std::string("god-object"); },
-          [&](const ForceShadingLaw& l) { return "force-shading" + suffix(l.formulation); },
-          [&](const HeightFieldLaw& l) { return "height-field" + suffix(l.formulation); },
-          [&](const MesostructureLaw& l) { return "mesostructure" + suffix(l.formulation); },
-          [](const GeneratedGeometryLaw&) { return std::string("generated-geometry"); },
-          [](const DenseMeshLaw&) { return std::string("dense-mesh"); },
-          [&](const AvilaLaw& l) { return "avila" + suffix(l.formulation); },
-          [&](const CrossUncrossLaw& l) { return "cross-uncross" + suffix(l.formulation); },
-          [&](const VirtualContactPointLaw& l) { return "virtual-contact-point" + suffix(l.formulation); },
-          [&](const MagneticLaw& l) { return "magnetic" + suffix(l.formulation); },
-          [](const NormalPerturbationLaw&) { return std::string("normal-perturbation"); },
-          [](const std::shared_ptr<const CustomLaw>& l) { return l == nullptr ? std::string("custom") : l->name(); },
+      []<class L>(const L& one) -> std::optional<Formulation> {
+        if constexpr (has_two_forms<L>) {
+          return one.formulation;
+        } else {
+          return std::nullopt;
+        }
       },
       law);
 }
 
-const std::vector<std::string>& law_names() {
-  static const std::vector<std::string> names{"proxy",
-                                              "god-object",
-                                              "force-shading",
-                                              "force-shading-literal",
-                                              "height-field",
-                                              "height-field-literal",
-                                              "mesostructure",
-                                              "mesostructure-literal",
-                                              "generated-geometry",
-                                              "dense-mesh",
-                                              "avila",
-                                              "avila-literal",
-                                              "cross-uncross",
-                                              "cross-uncross-literal",
-                                              "virtual-contact-point",
-                                              "virtual-contact-point-literal",
-                                              "magnetic",
-                                              "magnetic-literal",
-                                              "normal-perturbation"};
-  return names;
+Law in_formulation(const Law& law, Formulation formulation) {
+  return std::visit(
+      [&]<class L>(const L& one) -> Law {
+        if constexpr (has_two_forms<L>) {
+          return L{.formulation = formulation};
+        } else {
+          return one;
+        }
+      },
+      law);
 }
 
 Result<Law> law_by_name(std::string_view name) {
-  // The 2005 paper forces heights to 0 at the edges; it gives no width, so the later paper's band is taken.
-  constexpr double literal_taper = 0.05;
-  if (name == "proxy") return Law(ProxyLaw{});
-  if (name == "god-object") return Law(GodObjectLaw{});
-  if (name == "force-shading") return Law(ForceShadingLaw{});
-  if (name == "force-shading-literal") return Law(ForceShadingLaw{Formulation::literal});
-  if (name == "height-field") return Law(HeightFieldLaw{});
-  if (name == "height-field-literal") return Law(HeightFieldLaw{Formulation::literal, literal_taper});
-  if (name == "mesostructure") return Law(MesostructureLaw{});
-  if (name == "mesostructure-literal") return Law(MesostructureLaw{Formulation::literal, 0.05, Blend::s_shape, {}});
-  if (name == "generated-geometry") return Law(GeneratedGeometryLaw{});
-  if (name == "dense-mesh") return Law(DenseMeshLaw{});
-  if (name == "avila") return Law(AvilaLaw{});
-  if (name == "avila-literal") return Law(AvilaLaw{Formulation::literal});
-  if (name == "cross-uncross") return Law(CrossUncrossLaw{});
-  if (name == "cross-uncross-literal") return Law(CrossUncrossLaw{Formulation::literal});
-  if (name == "virtual-contact-point") return Law(VirtualContactPointLaw{});
-  if (name == "virtual-contact-point-literal") return Law(VirtualContactPointLaw{Formulation::literal});
-  if (name == "magnetic") return Law(MagneticLaw{});
-  if (name == "magnetic-literal") return Law(MagneticLaw{Formulation::literal});
-  if (name == "normal-perturbation") return Law(NormalPerturbationLaw{});
+  for (const NamedLaw& named : named_laws())
+    if (named.name == name) return named.law;
+  const std::vector<std::string>& custom = custom_law_names();
+  if (std::find(custom.begin(), custom.end(), name) != custom.end()) return make_custom_law(name, {});
   std::vector<std::string> all = law_names();
-  all.insert(all.end(), custom_law_names().begin(), custom_law_names().end());
-  if (std::find(all.begin(), all.end(), name) != all.end()) return make_custom_law(name, {});
+  all.insert(all.end(), custom.begin(), custom.end());
   std::string list;
   for (const std::string& known : all) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, all);

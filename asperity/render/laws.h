@@ -2,6 +2,7 @@
 // How a surface is felt: the settings of the contact laws. One source file per method holds what they do.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -42,10 +43,12 @@ struct ForceShadingLaw {
 ///   2):
 ///               no energy from nothing (errata 1, 10)
 struct HeightFieldLaw {
+  /// The 2005 paper forces heights to 0 at the edges; it gives no width, so the later paper's band is taken.
+  static constexpr double literal_taper = 0.05;
   Formulation formulation = Formulation::consistent;
   /// Share of each triangle (in barycentric coordinates) over which heights fall to 0 towards its edges: the C0 rule of
-  /// 2005, whose width the paper leaves open. 0 turns it off. In 0 … 1/3.
-  double edge_taper = 0.0;
+  /// 2005. 0 turns it off. In 0 … 1/3.
+  double edge_taper = formulation == Formulation::literal ? literal_taper : 0.0;
 };
 
 /// Mesostructure blended over adjoining faces (hrm-2010, Algorithm 2).
@@ -55,9 +58,9 @@ struct HeightFieldLaw {
 ///   2)
 struct MesostructureLaw {
   Formulation formulation = Formulation::consistent;
-  double rho = 0.05;              ///< literal: width of the band in barycentric coordinates, above 0, at most 1/3
-  Blend blend = Blend::s_shape;   ///< literal: weights over the band
-  std::vector<double> blend_map;  ///< literal, Blend::image: weights at t = 0 … 1, evenly spaced, at least two
+  double rho = 0.05;                   ///< literal: width of the band in barycentric coordinates, above 0, at most 1/3
+  Blend blend = Blend::s_shape;        ///< literal: weights over the band
+  std::vector<double> blend_map = {};  ///< literal, Blend::image: weights at t = 0 … 1, evenly spaced, at least two
   /// literal: the blend on the fly of section 4.2. Within the band around any edge heights and normals are averaged
   /// over every neighbouring prism that holds the probe.
   bool test_neighbours = false;
@@ -111,6 +114,12 @@ enum class ContactMagnitude {
   distance,   ///< to the virtual contact point (hybrid-surface-2004)
   potential,  ///< what the potential says (Avila and Sobierajski 1996): softer where edges are interpolated
 };
+/// As in scene files.
+template <>
+struct Names<ContactMagnitude> {
+  static constexpr auto table = std::to_array<Named<ContactMagnitude>>(
+      {{ContactMagnitude::distance, "distance"}, {ContactMagnitude::potential, "potential"}});
+};
 
 /// Virtual contact point of an implicit surface: the probe is held by a spring and a damper to the surface's point
 /// along the potential's gradient (hybrid-surface-2004, eq. 1), which friction retards (eq. 2; f_c is the material's
@@ -152,14 +161,19 @@ using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw
                          GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw,
                          MagneticLaw, NormalPerturbationLaw, std::shared_ptr<const CustomLaw>>;
 
-/// "proxy", "god-object", "force-shading", "height-field", "mesostructure", the last two with "-literal" appended where
-/// it is, "generated-geometry", "dense-mesh", "avila", "cross-uncross", "virtual-contact-point", "magnetic" (and
-/// "-literal"), "normal-perturbation"; a program's own law by the name that it was given. [any]
+/// "proxy", "god-object", "force-shading", "height-field", "mesostructure", "generated-geometry", "dense-mesh",
+/// "avila", "cross-uncross", "virtual-contact-point", "magnetic", "normal-perturbation", with "-literal" appended where
+/// a law with two forms has that one; a program's own law by the name that it was given. [any]
 std::string law_name(const Law& law);
 /// The law of that name with default options, built in or registered. Errors: bad_value listing the names. [any]
 Result<Law> law_by_name(std::string_view name);
 /// Every built-in name that law_by_name accepts. [any]
 const std::vector<std::string>& law_names();
+/// Its form, where the law has two; nothing where it has one. [any]
+std::optional<Formulation> formulation_of(const Law& law);
+/// A law of the same kind in that form, with the default options of that form: what the name with or without "-literal"
+/// makes. A law with one form: the law itself. [any]
+Law in_formulation(const Law& law, Formulation formulation);
 /// Errors: bad_value naming the option and what would be accepted. [build]
 Status validate(const Law& law);
 

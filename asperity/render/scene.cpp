@@ -189,17 +189,6 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
   return success();
 }
 
-Box transformed(const Box& box, const Pose& pose) {
-  Box world;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 local((corner & 1) != 0 ? box.upper.x() : box.lower.x(),
-                     (corner & 2) != 0 ? box.upper.y() : box.lower.y(),
-                     (corner & 4) != 0 ? box.upper.z() : box.lower.z());
-    world.include(pose.apply(local));
-  }
-  return world;
-}
-
 }  // namespace
 
 const char* surface_kind(const Surface& surface) {
@@ -365,12 +354,7 @@ Box swept_bounds(const Instance& instance, const Box& local) {
   if (!motion.moves()) return here;
   const Vec3& origin = instance.world_from_object.position;
   double reach = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    const Vec3 at((corner & 1U) != 0 ? here.upper.x() : here.lower.x(),
-                  (corner & 2U) != 0 ? here.upper.y() : here.lower.y(),
-                  (corner & 4U) != 0 ? here.upper.z() : here.lower.z());
-    reach = std::max(reach, (at - origin).norm());
-  }
+  for (unsigned k = 0; k < 8; ++k) reach = std::max(reach, (here.corner(k) - origin).norm());
   const bool turns = !motion.velocity.angular.isZero(0.0);
   Box all = here;
   if (turns) {

@@ -263,10 +263,7 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene,
 }
 
 const char* flag_name(std::size_t bit) {
-  constexpr const char* names[] = {"contact",        "not_converged", "started_inside",    "input_not_finite",
-                                   "force_limited",  "slew_limited",  "output_not_finite", "contacts_dropped",
-                                   "energy_limited", "coarse_data",   "field_force",       "texture_faded"};
-  return bit < std::size(names) ? names[bit] : "unknown";
+  return bit < 32 ? to_string(static_cast<TickFlag>(std::uint32_t{1} << bit)) : "unknown";
 }
 
 double percentile(std::span<const double> values, double p) {

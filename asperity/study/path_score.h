@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/core/progress.h"
 #include "asperity/core/trace_record.h"
 #include "asperity/io/trace_file.h"
@@ -28,6 +29,12 @@ struct MeasuredSample {
 enum class PathPlace {
   surface,  ///< on the true surface, as a stiff probe's tip does: laws are driven at x - F / k
   probe,    ///< of a device's probe, F / k beneath what it touches already: laws are driven there
+};
+/// As in options and `--json`.
+template <>
+struct Names<PathPlace> {
+  static constexpr auto table =
+      std::to_array<Named<PathPlace>>({{PathPlace::surface, "surface"}, {PathPlace::probe, "probe"}});
 };
 
 /// A trajectory.

@@ -36,10 +36,7 @@ Vec3 average_normal(const StrokePath& path) {
 }
 
 void add_corners(const Box& box, std::vector<Vec3>& points) {
-  for (int k = 0; k < 8; ++k) {
-    points.emplace_back((k & 1 ? box.upper : box.lower).x(), (k & 2 ? box.upper : box.lower).y(),
-                        (k & 4 ? box.upper : box.lower).z());
-  }
+  for (unsigned k = 0; k < 8; ++k) points.push_back(box.corner(k));
 }
 
 /// What there is to see: of a volume its isosurface alone.
@@ -47,10 +44,9 @@ Box visible_bounds(const Scene& scene) {
   Box all;
   for (std::size_t i = 0; i < scene.instances().size(); ++i) {
     const Instance& instance = scene.instances()[i];
-    std::vector<Vec3> corners;
     const IsoSurface* iso = iso_of(instance.surface);
-    add_corners(iso != nullptr ? iso->surface_bounds() : scene.world_bounds(i), corners);
-    for (const Vec3& corner : corners) all.include(iso != nullptr ? instance.world_from_object.apply(corner) : corner);
+    all.include(iso != nullptr ? transformed(iso->surface_bounds(), instance.world_from_object)
+                               : scene.world_bounds(i));
   }
   return all;
 }
@@ -126,7 +122,7 @@ Status check(const PictureSettings& settings) {
   };
   if (settings.width < 16 || settings.width > 4096) return bad("width", "16 to 4096 pixels");
   if (settings.height < 16 || settings.height > 4096) return bad("height", "16 to 4096 pixels");
-  if (settings.threads < 1 || settings.threads > 64) return bad("threads", "1 to 64");
+  if (settings.threads < 0 || settings.threads > 64) return bad("threads", "0 (one a processor) to 64");
   if (!(settings.budget > 0.0) || !std::isfinite(settings.budget)) return bad("budget", "a time above 0 s");
   return success();
 }
@@ -163,11 +159,12 @@ Result<Picture> render_picture(const Scene& scene, const StrokePath& path, std::
   const Vec3 normal = average_normal(path);
   const std::vector<Vec3> framing = framing_points(scene, path);
   const Camera wanted = three_quarter_view(framing, normal, settings.width, settings.height);
-  const CastCost cost = measure_cost(scene, wanted, sparse, settings.threads);
+  const auto threads = static_cast<unsigned>(settings.threads);
+  const CastCost cost = measure_cost(scene, wanted, sparse, threads);
   const Detail detail = choose_detail(cost, wanted.width * wanted.height, settings.budget);
   const Camera camera = resized(wanted, detail.size);
-  const PixelGrid grid = cast_image(scene, camera, detail.block, settings.threads, progress);
-  const std::vector<EdgePixel> edges = cast_edges(scene, camera, grid, detail.edges, settings.threads);
+  const PixelGrid grid = cast_image(scene, camera, detail.block, threads, progress);
+  const std::vector<EdgePixel> edges = cast_edges(scene, camera, grid, detail.edges, threads);
 
   const Shaded shaded = shade(grid, edges, camera, normal);
   std::vector<Colour> colours = shaded.colours;

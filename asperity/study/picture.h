@@ -18,7 +18,7 @@ namespace asperity {
 struct PictureSettings {
   int width = 900;      ///< pixels, 16 to 4096
   int height = 600;     ///< pixels, 16 to 4096
-  int threads = 2;      ///< 1 to 64
+  int threads = 0;      ///< at most so many, up to 64; 0: one a processor
   double budget = 1.6;  ///< s of wall time to aim at, above 0; detail is given up where a coarse pass says that it
                         ///< would be exceeded
 };

@@ -370,17 +370,7 @@ std::string text_of(const RenderFinding& found, const ReliefShape& shape, const 
 }  // namespace
 
 const char* criterion_name(Criterion criterion) {
-  switch (criterion) {
-    case Criterion::stiffness: return "stiffness";
-    case Criterion::force: return "force";
-    case Criterion::fidelity: return "fidelity";
-    case Criterion::hand: return "hand";
-    case Criterion::sampling: return "sampling";
-    case Criterion::resolution: return "resolution";
-    case Criterion::perception: return "perception";
-    case Criterion::steps: return "steps";
-  }
-  return "unknown";
+  return to_string(criterion);
 }
 
 double least_stiffness(double force, double crest_radius) noexcept {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/device/hand.h"
 #include "asperity/device/profile.h"
 #include "asperity/study/relief_shape.h"
@@ -37,6 +38,18 @@ enum class Criterion {
   perception,  ///< max(0.03 N, 10 % of F) <= k c: the relief changes the force by what is noticed
   steps,       ///< k times the map's step <= 0.03 N: its own levels are not noticed
 };
+/// As in `--json`.
+template <>
+struct Names<Criterion> {
+  static constexpr auto table = std::to_array<Named<Criterion>>({{Criterion::stiffness, "stiffness"},
+                                                                 {Criterion::force, "force"},
+                                                                 {Criterion::fidelity, "fidelity"},
+                                                                 {Criterion::hand, "hand"},
+                                                                 {Criterion::sampling, "sampling"},
+                                                                 {Criterion::resolution, "resolution"},
+                                                                 {Criterion::perception, "perception"},
+                                                                 {Criterion::steps, "steps"}});
+};
 inline constexpr int criterion_count = 8;
 /// "fidelity", ... [any]
 const char* criterion_name(Criterion criterion);
@@ -57,6 +70,15 @@ enum class Knob {
   force,      ///< N
   speed,      ///< m/s
   stiffness,  ///< N/m
+};
+/// As in `--json`, with their units.
+template <>
+struct Names<Knob> {
+  static constexpr auto table = std::to_array<Named<Knob>>({{Knob::height, "height_m"},
+                                                            {Knob::width, "wave_m"},
+                                                            {Knob::force, "force_n"},
+                                                            {Knob::speed, "speed_m_s"},
+                                                            {Knob::stiffness, "stiffness_n_m"}});
 };
 inline constexpr int knob_count = 5;
 

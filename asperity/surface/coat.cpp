@@ -190,6 +190,8 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSe
         "one number of a map for every triangle"};
   }
   Coat coat;
+  coat.mesh_ = mesh.fingerprint();
+  coat.mesh_triangles_ = mesh.triangles().size();
   coat.settings_ = settings;
   coat.lowest_ = infinity;
   coat.highest_ = -infinity;
@@ -207,6 +209,18 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSe
     return bad_mapping("is \"uv\", but the texture coordinates span no area on any face looked at");
   coat.find_seams(mesh);
   return coat;
+}
+
+Status Coat::check_fits(const TriangleMesh& mesh) const {
+  if (mesh.fingerprint() == mesh_) return success();
+  const std::size_t triangles = mesh.triangles().size();
+  return Error{ErrorCode::mismatch,
+               triangles == mesh_triangles_
+                   ? fmt::format("was laid on another mesh of {} triangles than this one", triangles)
+                   : fmt::format("was laid on a mesh of {} triangles, this one has {}", mesh_triangles_, triangles),
+               {},
+               "coat",
+               "a coat that Coat::build has laid on the base's own mesh"};
 }
 
 Status Coat::take_layers(std::vector<CoatLayer> layers) {

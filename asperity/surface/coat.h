@@ -21,6 +21,12 @@ namespace asperity {
 ///              axis a weighs max(0, n_a^2 - |n|^2 / 5)^2, so that within about 27 degrees of an axis it is alone.
 ///              Continuous over every edge, no UVs needed
 enum class Mapping { per_face, uv, triplanar };
+/// As in scene files.
+template <>
+struct Names<Mapping> {
+  static constexpr auto table = std::to_array<Named<Mapping>>(
+      {{Mapping::uv, "uv"}, {Mapping::per_face, "per_face"}, {Mapping::triplanar, "triplanar"}});
+};
 
 /// How a mesostructure lies on a mesh.
 struct CoatSettings {
@@ -103,6 +109,10 @@ class Coat {
   /// [build]
   static Result<Coat> build(const TriangleMesh& mesh, CoatParts parts, const CoatSettings& settings);
 
+  /// Whether it may lie on this mesh: the one that it was built for, a copy of it, one built from the same, or one of
+  /// these with its vertices moved. Errors: mismatch. [any]
+  [[nodiscard]] Status check_fits(const TriangleMesh& mesh) const;
+
   /// The coat over the point of `face` with these barycentric coordinates, which may lie outside the triangle (its
   /// plane and its mapping are continued): stitching needs that. [servo]
   [[nodiscard]] CoatSample sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric,
@@ -167,6 +177,8 @@ class Coat {
   void find_seams(const TriangleMesh& mesh);
   [[nodiscard]] double finest_grain(const TriangleMesh& mesh) const;
 
+  std::uint64_t mesh_ = 0;          ///< fingerprint of the mesh that it was built for
+  std::size_t mesh_triangles_ = 0;  ///< and how many triangles that has
   std::vector<std::shared_ptr<const Mesostructure>> maps_;
   std::vector<std::uint8_t> map_of_face_;  ///< empty: the first map everywhere
   std::vector<CoatLayer> layers_;

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <utility>
 
+#include "asperity/core/identity.h"
 #include "asperity/core/suggest.h"
 #include "asperity/core/units.h"
 
@@ -21,11 +21,6 @@ constexpr double settled = 1e-3;        // of a skin: two places are one
 constexpr double touch_share = 0.5;     // of a skin: nearer than this is touched
 constexpr int most_samples = 4096;      // at which a field is measured
 constexpr double counted = 1.0 + 1e-6;  // rounding of what a field says of itself
-
-std::uint64_t next_custom_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 bool inside(const Box& box, const Vec3& p) noexcept {
   return (p.array() >= box.lower.array()).all() && (p.array() <= box.upper.array()).all();
@@ -88,7 +83,7 @@ Result<CustomSurface> CustomSurface::build(std::shared_ptr<const void> field, st
     return wrong("grain", fmt::format("is {}", facts.grain), "a length above 0 (m), or 0 for a default");
   if (facts.grain == 0.0) surface.facts_.grain = 0.01 * diagonal;
   surface.skin_ = std::min(1e-6 * diagonal, 1e-4 * surface.facts_.grain);
-  surface.identity_ = next_custom_identity();
+  surface.identity_ = next_identity();
   ASPERITY_CHECK(surface.measure());
   return surface;
 }

@@ -21,6 +21,15 @@ enum class IntermediateSurface : std::uint8_t {
   box,       ///< six planes, each with its own two edges as u and v; mixed near the box's edges so that nothing jumps
   uv,        ///< no surface between: the mesh's own texture coordinates, or a parametric surface's parameters, x `tile`
 };
+/// As in scene files.
+template <>
+struct Names<IntermediateSurface> {
+  static constexpr auto table = std::to_array<Named<IntermediateSurface>>({{IntermediateSurface::plane, "plane"},
+                                                                           {IntermediateSurface::cylinder, "cylinder"},
+                                                                           {IntermediateSurface::sphere, "sphere"},
+                                                                           {IntermediateSurface::box, "box"},
+                                                                           {IntermediateSurface::uv, "uv"}});
+};
 
 /// Settings of FeatureMapping.
 struct FeatureMappingSettings {

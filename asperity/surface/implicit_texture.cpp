@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <thread>
 #include <vector>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/core/rng.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/surface/iso_surface.h"
@@ -83,23 +82,9 @@ class LatticeNoise {
   std::array<std::uint8_t, period> order_{};
 };
 
-/// `work(i, thread)` for all i, shared by two threads; the one that called tells how far it is.
-template <class Work>
-void shared_by_two(std::size_t count, std::string_view what, double from, double to, const Progress& progress,
-                   const Work& work) {
-  constexpr std::size_t share = 16;
-  std::atomic<std::size_t> next{0};
-  const auto run = [&](int thread) {
-    for (std::size_t first = next.fetch_add(share); first < count; first = next.fetch_add(share)) {
-      if (thread == 0 && progress)
-        progress(what, from + (to - from) * static_cast<double>(first) / static_cast<double>(count));
-      for (std::size_t i = first; i < std::min(first + share, count); ++i) work(i, thread);
-    }
-  };
-  if (count <= share) return run(0);
-  std::thread helper(run, 1);
-  run(0);
-  helper.join();
+/// Blocks shared out over all cores; `from` and `to`: their part of the whole.
+ParallelSettings blocks_shared(std::string_view what, double from, double to, const Progress& progress) {
+  return {.grain = 16, .progress = &progress, .what = what, .from = from, .to = to};
 }
 
 /// The blocks around each block.
@@ -202,7 +187,7 @@ Result<AppliedHeights> apply(const SparseSource& before, const PointHeight& heig
   };
   const double limit = std::min(before.outside, -before.inside) - 2.0 * before.voxel;
   std::vector<PerBlock> found(before.blocks.size());
-  shared_by_two(before.blocks.size(), "texturing", 0.0, 0.3, progress, [&](std::size_t b, int) {
+  parallel_for(before.blocks.size(), blocks_shared("texturing", 0.0, 0.3, progress), [&](std::size_t b) {
     const SparseBlock& block = before.blocks[b];
     PerBlock& here = found[b];
     for (std::size_t point = 0; point < SparseBlock::points; ++point) {
@@ -262,7 +247,7 @@ void normalise(const SparseGrid& grid, SparseSource& source, const Progress& pro
   const Neighbours neighbours(source.blocks);
   std::vector<std::array<float, SparseBlock::points>> old(source.blocks.size());
   for (std::size_t b = 0; b < old.size(); ++b) old[b] = source.blocks[b].value;
-  shared_by_two(old.size(), "normalising", 0.3, 0.7, progress, [&](std::size_t b, int) {
+  parallel_for(old.size(), blocks_shared("normalising", 0.3, 0.7, progress), [&](std::size_t b) {
     SparseBlock& block = source.blocks[b];
     Padded<float> value;
     SparseHint hint;
@@ -393,23 +378,25 @@ class Redistancer {
 
   void run() {
     const std::size_t blocks = feet_.size();
-    shared_by_two(blocks, "redistancing", 0.3, 0.32, progress_, [&](std::size_t b, int) { seed(b); });
+    parallel_for(blocks, blocks_shared("redistancing", 0.3, 0.32, progress_), [&](std::size_t b) { seed(b); });
     next_ = feet_;
     const int rounds = static_cast<int>(std::ceil(reach_ / voxel_)) + 2;
     for (int round = 0; round < rounds; ++round) {
-      shared_by_two(blocks, "redistancing", 0.32, 0.4, progress_, [&](std::size_t b, int) { spread(b, nullptr); });
+      parallel_for(blocks, blocks_shared("redistancing", 0.32, 0.4, progress_),
+                   [&](std::size_t b) { spread(b, nullptr); });
       feet_.swap(next_);
     }
-    FootFinder finders[2] = {{field_, voxel_}, {field_, voxel_}};
-    shared_by_two(blocks, "redistancing", 0.4, 0.6, progress_,
-                  [&](std::size_t b, int thread) { refine(b, finders[thread]); });
+    std::vector<FootFinder> finders(parallel_workers(blocks, blocks_shared({}, 0.0, 1.0, progress_)),
+                                    FootFinder{field_, voxel_});
+    parallel_for(blocks, blocks_shared("redistancing", 0.4, 0.6, progress_),
+                 [&](std::size_t b, unsigned worker) { refine(b, finders[worker]); });
     // A neighbour may have found a place that is nearer: start from there again.
     for (int round = 0; round < 2; ++round) {
-      shared_by_two(blocks, "redistancing", 0.6, 0.7, progress_,
-                    [&](std::size_t b, int thread) { spread(b, &finders[thread]); });
+      parallel_for(blocks, blocks_shared("redistancing", 0.6, 0.7, progress_),
+                   [&](std::size_t b, unsigned worker) { spread(b, &finders[worker]); });
       feet_.swap(next_);
     }
-    shared_by_two(blocks, "redistancing", 0.7, 0.72, progress_, [&](std::size_t b, int) { store(b); });
+    parallel_for(blocks, blocks_shared("redistancing", 0.7, 0.72, progress_), [&](std::size_t b) { store(b); });
     textured_.outside = outside_;
     textured_.inside = inside_;
   }
@@ -551,12 +538,13 @@ DistanceError distance_error(const SparseGrid& grid, const SparseSource& source,
   const ScalarField field(std::make_shared<const SparseGrid>(grid));
   const IsoView view{&field, 0, 0.0, 1.0};
   std::vector<double> error(sample.size(), not_a_number);
-  IsoHint hints[2];
-  SparseHint bricks[2];
-  shared_by_two(sample.size(), "measuring", from, to, progress, [&](std::size_t i, int thread) {
-    hints[thread].has_foot = false;
-    const Foot foot = view.closest(sample[i], 2.0 * source.voxel, hints[thread]);
-    if (foot.found()) error[i] = std::abs(std::abs(grid.trilinear(sample[i], bricks[thread]).value) - foot.distance);
+  const ParallelSettings settings = blocks_shared("measuring", from, to, progress);
+  std::vector<IsoHint> hints(parallel_workers(sample.size(), settings));
+  std::vector<SparseHint> bricks(hints.size());
+  parallel_for(sample.size(), settings, [&](std::size_t i, unsigned worker) {
+    hints[worker].has_foot = false;
+    const Foot foot = view.closest(sample[i], 2.0 * source.voxel, hints[worker]);
+    if (foot.found()) error[i] = std::abs(std::abs(grid.trilinear(sample[i], bricks[worker]).value) - foot.distance);
   });
   DistanceError all;
   double squares = 0.0;
@@ -622,20 +610,9 @@ PointHeight coat_height(const Coat& coat, const TriangleMesh& mesh) {
   };
 }
 
-const char* to_string(Redistancing mode) {
-  switch (mode) {
-    case Redistancing::none: return "none";
-    case Redistancing::normalised: return "normalised";
-    case Redistancing::redistanced: break;
-  }
-  return "redistanced";
-}
-
 Result<Redistancing> parse_redistancing(std::string_view name) {
-  for (const Redistancing mode : {Redistancing::none, Redistancing::normalised, Redistancing::redistanced}) {
-    if (name == to_string(mode)) return mode;
-  }
-  return Error{ErrorCode::bad_value, fmt::format("is \"{}\"", name), {}, {}, "none, normalised or redistanced"};
+  if (const std::optional<Redistancing> mode = value_named<Redistancing>(name)) return *mode;
+  return Error{ErrorCode::bad_value, fmt::format("is \"{}\"", name), {}, {}, name_list<Redistancing>("", " or ")};
 }
 
 Result<TexturedPotential> textured(const SparseGrid& grid, const PointHeight& height, Redistancing mode,

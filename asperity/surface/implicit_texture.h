@@ -5,6 +5,7 @@
 #include <memory>
 #include <string_view>
 
+#include "asperity/core/names.h"
 #include "asperity/core/progress.h"
 #include "asperity/field/sparse_grid.h"
 #include "asperity/surface/coat.h"
@@ -32,8 +33,13 @@ enum class Redistancing : std::uint8_t {
   normalised,   ///< that divided by its own slope: right to first order at the surface
   redistanced,  ///< the distance to the textured zero set itself, point by point
 };
-/// "none", "normalised", "redistanced". [any]
-const char* to_string(Redistancing mode);
+/// As in scene files and options.
+template <>
+struct Names<Redistancing> {
+  static constexpr auto table = std::to_array<Named<Redistancing>>({{Redistancing::none, "none"},
+                                                                    {Redistancing::normalised, "normalised"},
+                                                                    {Redistancing::redistanced, "redistanced"}});
+};
 /// Errors: bad_value listing the names. [any]
 Result<Redistancing> parse_redistancing(std::string_view name);
 

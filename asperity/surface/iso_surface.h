@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "asperity/core/names.h"
 #include "asperity/field/scalar_field.h"
 #include "asperity/surface/surface.h"
 
@@ -12,6 +13,11 @@ namespace asperity {
 enum class Inside : std::uint8_t {
   low,   ///< values below the threshold (large-data-2008)
   high,  ///< values above it: densities, vortices
+};
+/// As in scene files.
+template <>
+struct Names<Inside> {
+  static constexpr auto table = std::to_array<Named<Inside>>({{Inside::low, "low"}, {Inside::high, "high"}});
 };
 
 /// Where a motion passes a threshold.

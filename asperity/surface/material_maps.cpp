@@ -7,11 +7,6 @@
 
 namespace asperity {
 
-const char* to_string(MaterialChannel channel) {
-  constexpr const char* names[] = {"stiffness", "damping", "viscosity", "friction", "magnetism", "stickiness"};
-  return names[static_cast<std::size_t>(channel)];
-}
-
 Result<MaterialMaps> MaterialMaps::build(Parts parts) {
   for (std::size_t c = 0; c < mapped_channels; ++c) {
     const HeightMap* map = parts.channels[c].get();

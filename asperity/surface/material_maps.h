@@ -20,10 +20,17 @@ enum class MaterialChannel : std::size_t {
   magnetism,   ///< N/m: how steeply the surface draws the probe (Material::magnetism)
   stickiness,  ///< N: how hard it holds the probe back
 };
+/// As in scene files.
+template <>
+struct Names<MaterialChannel> {
+  static constexpr auto table = std::to_array<Named<MaterialChannel>>({{MaterialChannel::stiffness, "stiffness"},
+                                                                       {MaterialChannel::damping, "damping"},
+                                                                       {MaterialChannel::viscosity, "viscosity"},
+                                                                       {MaterialChannel::friction, "friction"},
+                                                                       {MaterialChannel::magnetism, "magnetism"},
+                                                                       {MaterialChannel::stickiness, "stickiness"}});
+};
 inline constexpr std::size_t mapped_channels = 6;
-
-/// "stiffness", "damping", ... as scenes call them. [any]
-const char* to_string(MaterialChannel channel);
 
 /// What the maps say at one place.
 struct LocalMaterial {

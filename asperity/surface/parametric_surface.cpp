@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 
+#include "asperity/core/identity.h"
 #include "asperity/core/rng.h"
 #include "asperity/core/units.h"
 #include "asperity/surface/detail/parametric_shapes.h"
@@ -23,11 +23,6 @@ constexpr int shape_places = 1024;
 constexpr std::size_t most_features = 16;
 // Share of the radius of curvature that features may use up.
 constexpr double most_of_radius = 0.95;
-
-std::uint64_t next_parametric_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 /// Bounds of a feature's slope (m/m) and of how fast that changes away from edges (1/m), in the plane of the features.
 struct Steepness {
@@ -114,7 +109,7 @@ Result<ParametricSurface> ParametricSurface::build(const ParametricSettings& set
   ASPERITY_CHECK(surface.measure());
   ASPERITY_CHECK(surface.check_features());
   surface.make_patches();
-  surface.identity_ = next_parametric_identity();
+  surface.identity_ = next_identity();
   return surface;
 }
 

@@ -21,6 +21,16 @@ enum class ParametricShape : std::uint8_t {
   vase,      ///< of revolution: bottom, belly, neck and lip of Fig. 11; profile rho(v), v the height
   ramp,  ///< (v cos u, v sin u, v^3 + 3 u) of section 3.1.3, u = theta in 0 … pi, v = r in 1 … 3, all times `scale`
 };
+/// As in scene files.
+template <>
+struct Names<ParametricShape> {
+  static constexpr auto table = std::to_array<Named<ParametricShape>>({{ParametricShape::plane, "plane"},
+                                                                       {ParametricShape::cylinder, "cylinder"},
+                                                                       {ParametricShape::sphere, "sphere"},
+                                                                       {ParametricShape::torus, "torus"},
+                                                                       {ParametricShape::vase, "vase"},
+                                                                       {ParametricShape::ramp, "ramp"}});
+};
 
 /// A formula and its sizes; a member that a shape does not take (parametric_parameters) is left at its default.
 struct ParametricSettings {

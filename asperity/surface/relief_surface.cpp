@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+
+#include "asperity/core/identity.h"
 
 namespace asperity {
 
@@ -61,11 +62,6 @@ bool hulls_apart(const ShellPrism& one, const std::array<Vec3, 6>& one_hull, con
   return false;
 }
 
-std::uint64_t next_relief_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
-
 Error overlap_error(const std::string& what) {
   return Error{ErrorCode::bad_mesh, what, {}, "coat", "a lower relief, or on_overlap \"cure\""};
 }
@@ -94,14 +90,17 @@ std::string ReliefReport::advice() const {
 }
 
 ReliefSurface::ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest)
-    : identity_(next_relief_identity()), base_(std::move(base)), rest_(std::move(rest)), coat_(std::move(coat)) {
+    : identity_(next_identity()), base_(std::move(base)), rest_(std::move(rest)), coat_(std::move(coat)) {
   fit(ShellDirections::least_squares);
 }
 
-ReliefSurface::ReliefSurface(MeshSurface base, Coat coat) : ReliefSurface(base, std::move(coat), base) {}
+// Braces: the check comes before the coat is moved.
+ReliefSurface::ReliefSurface(MeshSurface base, Coat coat)
+    : ReliefSurface{(static_cast<void>(coat.check_fits(base.mesh()).value()), base), std::move(coat), base} {}
 
 Result<ReliefSurface> ReliefSurface::build(MeshSurface base, Coat coat, const ReliefSettings& settings) {
-  ReliefSurface relief(std::move(base), std::move(coat));
+  ASPERITY_CHECK(coat.check_fits(base.mesh()));
+  ReliefSurface relief(base, std::move(coat), base);
   ASPERITY_CHECK(relief.settle(settings));
   return relief;
 }

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/core/names.h"
 #include "asperity/surface/coat.h"
 #include "asperity/surface/mesh_surface.h"
 #include "asperity/surface/prisms.h"
@@ -14,6 +15,12 @@ namespace asperity {
 enum class OnOverlap {
   cure,    ///< turn the directions where that helps, then lower the relief around the vertices at fault, and report it
   refuse,  ///< Error naming the faces and vertices
+};
+/// As in scene files.
+template <>
+struct Names<OnOverlap> {
+  static constexpr auto table =
+      std::to_array<Named<OnOverlap>>({{OnOverlap::cure, "cure"}, {OnOverlap::refuse, "refuse"}});
 };
 
 /// How a relief is made from a base and a coat.
@@ -44,10 +51,11 @@ struct ReliefReport {
 /// moment that the hint tells.
 class ReliefSurface {
  public:
-  /// Errors: bad_mesh (a relief that folds over, when `settings` refuse that), naming faces, vertices and the largest
-  /// share of the amplitude that fits. [build]
+  /// Errors: mismatch (a coat that was laid on another mesh than the base's), bad_mesh (a relief that folds over, when
+  /// `settings` refuse that), naming faces, vertices and the largest share of the amplitude that fits. [build]
   static Result<ReliefSurface> build(MeshSurface base, Coat coat, const ReliefSettings& settings = {});
-  /// The same with the default settings, which cannot fail. [build]
+  /// The same with the default settings, for a coat that is known to have been laid on this base: with another one the
+  /// program ends with build's message. [build]
   ReliefSurface(MeshSurface base, Coat coat);
   /// The same coat, asked for in the same way, on the base after its vertices moved (DeformableMesh): shell, bands and
   /// room for the heights are found anew. Mappings go by places (triplanar, solid) of the mesh that the coat was laid

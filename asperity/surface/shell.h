@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 #include "asperity/geometry/mesh.h"
 
 namespace asperity {
@@ -70,6 +71,12 @@ ShellGradients shell_gradients(const ShellPrism& prism, const ShellPlace& at) no
 enum class ShellDirections {
   least_squares,  ///< N . n about 1 over the faces around, so that a height is metric over each (amendment 2)
   relaxed,        ///< the same, then smoothed over the mesh where that lets a higher relief fit
+};
+/// As in scene files.
+template <>
+struct Names<ShellDirections> {
+  static constexpr auto table = std::to_array<Named<ShellDirections>>(
+      {{ShellDirections::least_squares, "least_squares"}, {ShellDirections::relaxed, "relaxed"}});
 };
 
 /// One direction a vertex, and which vertices have none that all their faces see from the front.

@@ -17,12 +17,24 @@ namespace asperity {
 ///   linear    t          s_shape  3 t^2 - 2 t^3          quintic  6 t^5 - 15 t^4 + 10 t^3, C2
 ///   image     weights given at evenly spaced t
 enum class Blend { none, linear, s_shape, quintic, image };
+/// As in scene files; `image` is told by its weights.
+template <>
+struct Names<Blend> {
+  static constexpr auto table = std::to_array<Named<Blend>>(
+      {{Blend::none, "none"}, {Blend::linear, "linear"}, {Blend::s_shape, "s_shape"}, {Blend::quintic, "quintic"}});
+};
 
 /// What the join does to the base mesh's own folds.
 enum class FoldMode {
   keep,    ///< heights are blended, over the base's own folds, which stay
   round,   ///< penetrations are blended: within the band the fold becomes round
   fillet,  ///< concave folds get a fillet in place: a ball of `fillet_radius` rests on the faces; convex ones stay
+};
+/// As in scene files.
+template <>
+struct Names<FoldMode> {
+  static constexpr auto table = std::to_array<Named<FoldMode>>(
+      {{FoldMode::keep, "keep"}, {FoldMode::round, "round"}, {FoldMode::fillet, "fillet"}});
 };
 
 /// How the reliefs of neighbouring faces are joined.

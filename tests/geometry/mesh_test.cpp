@@ -254,5 +254,26 @@ TEST(TriangleMesh, MemoryStaysSmall) {
   EXPECT_LT(mesh.memory_bytes(), 46 * mesh.triangles().size());
 }
 
+TEST(MeshFingerprint, TellsMeshesApartByWhatTheyWereBuiltFrom) {
+  const auto built = [](MeshSource source) { return TriangleMesh::build(std::move(source)).value(); };
+  const TriangleMesh mesh = built(plane_grid(0.04, 0.04, 4, 4));
+  EXPECT_EQ(TriangleMesh(mesh).fingerprint(), mesh.fingerprint());
+  EXPECT_EQ(built(plane_grid(0.04, 0.04, 4, 4)).fingerprint(), mesh.fingerprint());
+  std::vector<Vec3> positions(mesh.positions().begin(), mesh.positions().end());
+  for (Vec3& p : positions) p.z() += 0.001 * p.x();
+  EXPECT_EQ(mesh.moved(positions).value().fingerprint(), mesh.fingerprint());
+
+  std::vector<MeshSource> others{plane_grid(0.04, 0.04, 5, 4), plane_grid(0.05, 0.04, 4, 4), icosphere(1, 0.02)};
+  others.push_back(plane_grid(0.04, 0.04, 4, 4));
+  others.back().corner_uvs.clear();
+  others.push_back(plane_grid(0.04, 0.04, 4, 4));
+  others.back().corner_uvs[3][1].x() += 1e-3F;
+  others.push_back(plane_grid(0.04, 0.04, 4, 4));
+  others.back().positions[7].z() += 1e-9;
+  others.push_back(plane_grid(0.04, 0.04, 4, 4));
+  std::swap(others.back().triangles[2], others.back().triangles[9]);
+  for (std::size_t i = 0; i < others.size(); ++i) EXPECT_NE(built(others[i]).fingerprint(), mesh.fingerprint()) << i;
+}
+
 }  // namespace
 }  // namespace asperity::mesh_test

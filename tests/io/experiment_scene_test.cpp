@@ -140,6 +140,21 @@ TEST_F(ExperimentScene, ATallReliefIsNoted) {
                         "mean edge"));
 }
 
+TEST_F(ExperimentScene, AReliefForWhichTheMeshIsTooCoarseIsNotedFromFifteenPercent) {
+  // hrm-2010, 5.4.1: "mesh zones where surface variation exceeds 15% of average edge size are thus candidates for finer
+  // remeshing". The reconstruction "nearest" keeps to the map's heights.
+  const auto noted = [&](const std::string& height) {
+    return has_note(
+        good(R"({"surfaces":[{"mesh":"sphere.ply","coat":{"height_map":"map.png","filter":"nearest","height":")" +
+             height + R"("}}]})"),
+        "mean edge");
+  };
+  EXPECT_FALSE(noted("14%"));
+  EXPECT_FALSE(noted("15%"));
+  EXPECT_TRUE(noted("16%"));
+  EXPECT_TRUE(noted("20%"));
+}
+
 TEST_F(ExperimentScene, DeviceHandAndProbeTakeNamesOrObjects) {
   const Experiment e =
       good(R"({"surfaces":[{"mesh":{"generator":"box"}}],"device":{"profile":"falcon","max_force":"6 N"},

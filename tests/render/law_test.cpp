@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "asperity/render/custom_law.h"
 #include "tests/render/fixtures.h"
 
 namespace asperity::law_test {
@@ -19,6 +20,48 @@ TEST(LawNames, every_name_makes_the_law_that_bears_it) {
     EXPECT_EQ(law_name(law), name);
     EXPECT_TRUE(validate(law).ok()) << name;
   }
+}
+
+TEST(LawNames, every_kind_of_law_is_listed_once_for_each_of_its_forms) {
+  std::vector<bool> kinds(std::variant_size_v<Law> - 1, false);
+  for (const std::string& name : law_names()) {
+    const Law law = named(name);
+    ASSERT_LT(law.index(), kinds.size()) << name;
+    kinds[law.index()] = true;
+    EXPECT_EQ(std::count(law_names().begin(), law_names().end(), name), 1) << name;
+    const bool literal = name.ends_with("-literal");
+    EXPECT_EQ(formulation_of(law).value_or(Formulation::consistent),
+              literal ? Formulation::literal : Formulation::consistent)
+        << name;
+    const std::string other = literal ? name.substr(0, name.size() - 8) : name + "-literal";
+    EXPECT_EQ(std::count(law_names().begin(), law_names().end(), other), formulation_of(law) ? 1 : 0) << name;
+    if (formulation_of(law)) {
+      EXPECT_EQ(law_name(in_formulation(law, Formulation::literal)), literal ? name : other);
+      EXPECT_EQ(law_name(in_formulation(law, Formulation::consistent)), literal ? other : name);
+    } else {
+      EXPECT_EQ(law_name(in_formulation(law, Formulation::literal)), name);
+    }
+  }
+  EXPECT_EQ(std::count(kinds.begin(), kinds.end(), false), 0);
+}
+
+TEST(LawNames, what_is_no_name_is_refused_by_either_way_in) {
+  for (const char* name :
+       {"", "-literal", "proxy-literal", "god-object-literal", "Proxy", "height-field-literal-literal", "custom"}) {
+    for (const Result<Law>& law : {law_by_name(name), make_custom_law(name, {})}) {
+      ASSERT_FALSE(law.ok()) << name;
+      EXPECT_EQ(law.error().code, ErrorCode::bad_value) << name;
+    }
+  }
+}
+
+TEST(LawNames, the_literal_height_field_has_its_taper_however_it_is_made) {
+  // 2005: heights are forced to 0 at the edges; a width is not given, the later paper's is taken.
+  EXPECT_EQ(std::get<HeightFieldLaw>(named("height-field-literal")).edge_taper, 0.05);
+  EXPECT_EQ(std::get<HeightFieldLaw>(in_formulation(HeightFieldLaw{}, Formulation::literal)).edge_taper, 0.05);
+  EXPECT_EQ(HeightFieldLaw{Formulation::literal}.edge_taper, 0.05);
+  EXPECT_EQ(HeightFieldLaw{}.edge_taper, 0.0);
+  EXPECT_EQ(HeightFieldLaw(HeightFieldLaw{Formulation::literal, 0.0}).edge_taper, 0.0);
 }
 
 TEST(LawNames, an_unknown_name_is_answered_with_the_nearest_and_the_list) {

@@ -147,7 +147,8 @@ TEST(Picture, BadSettingsAreNamed) {
   };
   EXPECT_EQ(refused([](PictureSettings& s) { s.width = 0; }), "picture.width");
   EXPECT_EQ(refused([](PictureSettings& s) { s.height = 100000; }), "picture.height");
-  EXPECT_EQ(refused([](PictureSettings& s) { s.threads = 0; }), "picture.threads");
+  EXPECT_EQ(refused([](PictureSettings& s) { s.threads = -1; }), "picture.threads");
+  EXPECT_EQ(refused([](PictureSettings& s) { s.threads = 65; }), "picture.threads");
   EXPECT_EQ(refused([](PictureSettings& s) { s.budget = std::nan(""); }), "picture.budget");
 }
 

@@ -247,5 +247,58 @@ TEST(BarycentricFrameTest, coordinates_and_height_undo_the_point) {
   }
 }
 
+/// What building a relief of a coat and a base answers.
+Error refused_on(MeshSource base, const Coat& coat) {
+  const auto relief = ReliefSurface::build(MeshSurface(TriangleIndex::build(mesh_of(std::move(base)))), coat);
+  EXPECT_FALSE(relief.ok());
+  return relief ? Error{} : relief.error();
+}
+
+TEST(CoatsMesh, a_coat_of_another_mesh_is_refused) {
+  const TriangleMesh own = mesh_of(plane_grid(0.04, 0.04, 8, 8));
+  const Coat coat = coat_on(own, wavy_map(1e-3), Mapping::uv);
+  MeshSource without_uvs = plane_grid(0.04, 0.04, 8, 8);
+  without_uvs.corner_uvs.clear();
+  MeshSource other_uvs = plane_grid(0.04, 0.04, 8, 8);
+  for (auto& uvs : other_uvs.corner_uvs) {
+    for (Vec2f& uv : uvs) uv *= 2.0F;
+  }
+  for (const MeshSource& other : {plane_grid(0.05, 0.04, 8, 8), icosphere(1, 0.02), without_uvs, other_uvs}) {
+    const Error error = refused_on(other, coat);
+    EXPECT_EQ(error.code, ErrorCode::mismatch);
+    EXPECT_EQ(error.place, "coat");
+    EXPECT_EQ(error.accepted, "a coat that Coat::build has laid on the base's own mesh");
+  }
+  EXPECT_EQ(refused_on(plane_grid(0.05, 0.04, 8, 8), coat).what,
+            "was laid on another mesh of 128 triangles than this one");
+  EXPECT_EQ(refused_on(icosphere(1, 0.02), coat).what, "was laid on a mesh of 128 triangles, this one has 80");
+}
+
+TEST(CoatsMesh, more_faces_than_the_coat_knows_of_are_refused) {
+  // Reading the map of a face or the seam of a vertex that the coat's mesh does not have would go beyond its arrays.
+  const TriangleMesh own = mesh_of(plane_grid(0.04, 0.04, 2, 2));
+  const auto map = tiled(wavy_map(1e-3));
+  const Coat coat = must(Coat::build(own, {map, map}, std::vector<std::uint8_t>(own.triangles().size(), 1),
+                                     CoatSettings{Mapping::uv, Vec2::Ones(), {}}));
+  EXPECT_EQ(refused_on(plane_grid(0.04, 0.04, 50, 50), coat).code, ErrorCode::mismatch);
+}
+
+TEST(CoatsMesh, its_own_mesh_a_twin_and_a_moved_one_are_accepted) {
+  const TriangleMesh own = mesh_of(plane_grid(0.04, 0.04, 8, 8));
+  const Coat coat = coat_on(own, wavy_map(1e-3), Mapping::uv);
+  std::vector<Vec3> positions(own.positions().begin(), own.positions().end());
+  for (Vec3& p : positions) p.z() += 0.1 * p.x();
+  for (const TriangleMesh& mesh : {own, mesh_of(plane_grid(0.04, 0.04, 8, 8)), must(own.moved(positions))}) {
+    for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree})
+      EXPECT_TRUE(ReliefSurface::build(MeshSurface(TriangleIndex::build(mesh, structure)), coat).ok());
+  }
+}
+
+TEST(CoatsMeshDeathTest, what_cannot_fail_ends_with_the_same_words) {
+  const Coat coat = coat_on(mesh_of(plane_grid(0.04, 0.04, 8, 8)), wavy_map(1e-3), Mapping::uv);
+  const MeshSurface other(TriangleIndex::build(mesh_of(icosphere(1, 0.02))));
+  EXPECT_DEATH(ReliefSurface(other, coat), "coat: was laid on a mesh of 128 triangles, this one has 80; accepted: ");
+}
+
 }  // namespace
 }  // namespace asperity::coat_test

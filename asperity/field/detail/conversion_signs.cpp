@@ -85,7 +85,7 @@ class Signs {
 
   void by_winding() {
     prepare();
-    for_each_in_parallel(blocks_.size(), [&](std::size_t b) {
+    parallel_for(blocks_.size(), shared_out, [&](std::size_t b) {
       for (std::uint32_t point = 0; point < SparseBlock::points; ++point) {
         const Node node{static_cast<std::uint32_t>(b), point};
         if (!reachable(node)) settle(node, winding(node));
@@ -146,7 +146,7 @@ class Signs {
     const double diagonal = mesh_.bounds().diagonal();
     const std::vector<LooseEnds> ends = loose_ends(mesh_, std::max(4.0 * voxel_, diagonal / 64.0));
     const double reach = 0.5 * std::sqrt(3.0) * (sign_side + 1) * voxel_;
-    for_each_in_parallel(blocks_.size(), [&](std::size_t b) {
+    parallel_for(blocks_.size(), shared_out, [&](std::size_t b) {
       const Vec3 centre = position({static_cast<std::uint32_t>(b), 0}) + Vec3::Constant(0.5 * (sign_side - 1) * voxel_);
       // Away from the triangles the winding number is the solid angle of the chain's span: its gradient is the field
       // of a current along the chain (Biot-Savart), at most length / (4 pi distance^2).

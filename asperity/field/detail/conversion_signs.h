@@ -2,40 +2,20 @@
 // Private to asperity/field: exact distances, and what tells inside from outside, when a mesh becomes a potential.
 
 #include <array>
-#include <atomic>
 #include <memory>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/field/mesh_conversion.h"
 #include "asperity/geometry/winding_number.h"
 
 namespace asperity::conversion {
 
-/// Calls work(i) for 0 … count - 1 from as many threads as there are processors, at most eight. [build]
-template <class Work>
-void for_each_in_parallel(std::size_t count, const Work& work) {
-  constexpr std::size_t share = 16;
-  std::atomic<std::size_t> next{0};
-  const auto run = [&] {
-    for (std::size_t from = next.fetch_add(share); from < count; from = next.fetch_add(share)) {
-      for (std::size_t i = from; i < std::min(from + share, count); ++i) work(i);
-    }
-  };
-  std::vector<std::thread> helpers;
-  const unsigned wanted = std::min(std::max(std::thread::hardware_concurrency(), 1U), 8U);
-  try {
-    while (helpers.size() + 1 < wanted) helpers.emplace_back(run);
-  } catch (const std::system_error&) {
-    // The threads that there are do it.
-  }
-  run();
-  for (std::thread& helper : helpers) helper.join();
-}
+/// Items that a thread takes at a time: blocks and points are not worth one each.
+inline constexpr ParallelSettings shared_out{.grain = 16};
 
 /// A stored point of a list of blocks.
 struct Node {

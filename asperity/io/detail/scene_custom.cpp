@@ -56,7 +56,6 @@ SceneJson named_numbers_json(const std::string& type, const NamedNumbers& number
 }
 
 Status read_custom(ObjectReader& surface, Instance& instance) {
-  static const std::vector<std::string> sides{"auto", "front", "both"};
   const std::string place = surface.place_of("custom");
   const SceneJson& json = *surface.raw("custom");
   if (!json.is_object())
@@ -78,11 +77,7 @@ Status read_custom(ObjectReader& surface, Instance& instance) {
   if (!made) return std::move(made).error().at(place);
   surface.write("custom", named_numbers_json(type, numbers));
   instance.name = surface.text("name", type);
-  switch (surface.choice("sides", sides, 0)) {
-    case 1: instance.sides = Sides::front; break;
-    case 2: instance.sides = Sides::both; break;
-    default: instance.sides = made->natural_sides(); break;
-  }
+  instance.sides = surface.choice_or_auto<Sides>("sides").value_or(made->natural_sides());
   instance.surface = std::make_shared<const CustomSurface>(std::move(*made));
   return surface.status();
 }

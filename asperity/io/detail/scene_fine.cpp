@@ -16,20 +16,6 @@ namespace {
 
 using std::numbers::pi;
 
-const std::vector<std::string>& formulation_names() {
-  static const std::vector<std::string> names{"literal", "consistent"};
-  return names;
-}
-const std::vector<std::string>& scale_names() {
-  static const std::vector<std::string> names{"auto", scale_name(FeatureScale::friction),
-                                              scale_name(FeatureScale::texture), scale_name(FeatureScale::shape)};
-  return names;
-}
-const std::vector<std::string>& mapping_names() {
-  static const std::vector<std::string> names{"plane", "cylinder", "sphere", "box", "uv"};
-  return names;
-}
-
 /// Lengths of one unit of u and of v where they are longest (m).
 Vec2 widest(const ParametricSurface& surface) {
   constexpr int steps = 64;
@@ -51,8 +37,7 @@ class MappingReader {
 
   Result<ScenePart<FeatureMapping>> read() {
     const bool parametric = host_.parametric != nullptr;
-    settings_.surface =
-        static_cast<IntermediateSurface>(reader_.choice("surface", mapping_names(), parametric ? 4 : 0));
+    settings_.surface = reader_.choice("surface", parametric ? IntermediateSurface::uv : IntermediateSurface::plane);
     ASPERITY_CHECK(reader_.status());
     refuse_others();
     if (settings_.surface == IntermediateSurface::uv) {
@@ -74,7 +59,7 @@ class MappingReader {
 
   void refuse_others() {
     const auto only_for = [&](bool mine, std::initializer_list<std::string_view> keys) {
-      if (!mine) reader_.refuse(keys, fmt::format("by the mapping \"{}\"", mapping_names()[index()]));
+      if (!mine) reader_.refuse(keys, fmt::format("by the mapping \"{}\"", to_string(settings_.surface)));
     };
     const IntermediateSurface surface = settings_.surface;
     only_for(surface != IntermediateSurface::uv, {"origin", "axis", "reference"});
@@ -82,7 +67,6 @@ class MappingReader {
     only_for(surface == IntermediateSurface::box, {"half_extent"});
     only_for(surface == IntermediateSurface::uv, {"tile"});
   }
-  [[nodiscard]] std::size_t index() const { return static_cast<std::size_t>(settings_.surface); }
 
   void read_tile() {
     Vec2 unit = Vec2::Ones();
@@ -152,9 +136,8 @@ class FeatureReader {
 
   Result<SurfaceFeature> read() {
     if (!reader_.failed() && !reader_.has("type")) reader_.fail("type", "is missing", "a feature's name");
-    const std::size_t kind = reader_.choice("type", feature_names(), 0);
+    spec_.kind = reader_.choice("type", FeatureKind::grating);
     ASPERITY_CHECK(reader_.status());
-    ASPERITY_TRY(spec_.kind, feature_by_name(feature_names()[kind]));
     refuse_others();
     if (takes("direction")) spec_.direction = reader_.quantity("direction", Dimension::angle, 0.0);
     if (takes("heights")) ASPERITY_CHECK(read_heights());
@@ -254,11 +237,10 @@ class FeatureReader {
   }
 
   Status read_heights() {
-    static const std::vector<std::string> filters{"nearest", "bilinear", "bspline"};
     HeightSourceReader source(reader_, context_, "height_map", "feature", 0.0);
     ASPERITY_CHECK(source.read_source());
     ASPERITY_CHECK(source.read_scale(1.0));
-    const auto filter = static_cast<Reconstruction>(reader_.choice("filter", filters, 2));
+    const auto filter = reader_.choice("filter", Reconstruction::quadratic_bspline);
     ASPERITY_CHECK(reader_.status());
     ASPERITY_TRY(HeightMap heights, source.build(Wrap::repeat, filter));
     if (source.sidecar()) {
@@ -287,20 +269,19 @@ class TextureReader {
         scales_(feature_scales(context.device.position_resolution)) {}
 
   Result<TexturePart> read() {
-    static const std::vector<std::string> sources{"features", "coat"};
     ASPERITY_CHECK(reader_.status());
     part_.given = true;
     ASPERITY_TRY(ScenePart<FeatureMapping> mapping,
                  MappingReader(reader_.raw("mapping"), reader_.place_of("mapping"), host_).read());
     part_.fine.mapping = std::move(mapping.value);
     reader_.write("mapping", std::move(mapping.canonical));
-    part_.fine.source = static_cast<TextureSource>(reader_.choice("source", sources, 0));
-    part_.fine.formulation = static_cast<Formulation>(reader_.choice("formulation", formulation_names(), 1));
+    part_.fine.source = reader_.choice("source", TextureSource::features);
+    part_.fine.formulation = reader_.choice("formulation", Formulation::consistent);
     ASPERITY_CHECK(reader_.status());
     if (part_.fine.source == TextureSource::coat) {
       check_coat();
     } else {
-      as_ = reader_.choice("as", scale_names(), 0);
+      as_ = reader_.choice_or_auto<FeatureScale>("as");
       ASPERITY_CHECK(reader_.status());
       ASPERITY_CHECK(read_features());
     }
@@ -384,13 +365,13 @@ class TextureReader {
   Status read_feature(const SceneJson& json, const std::string& place, SceneJson& canonical) {
     FeatureReader one(json, place, around(), context_);
     ASPERITY_TRY(SurfaceFeature feature, one.read());
-    const std::size_t as = one.reader().choice("as", scale_names(), as_);
+    const std::optional<FeatureScale> as = one.reader().choice_or_auto<FeatureScale>("as", as_);
     ASPERITY_CHECK(one.reader().status());
     if (auto fits = part_.fine.mapping.check(feature); !fits) return one.placed(std::move(fits).error());
     if (auto fits = check_closed(feature); !fits) return one.placed(std::move(fits).error());
     canonical = std::move(one.reader().canonical());
     const FeatureScale own = scale_of(feature.wavelength(), scales_);
-    const FeatureScale scale = as == 0 ? own : static_cast<FeatureScale>(as - 1);
+    const FeatureScale scale = as.value_or(own);
     note_scale(feature, own, scale);
     if (scale == FeatureScale::shape) ASPERITY_CHECK(check_geometry(feature, place));
     (scale == FeatureScale::friction  ? part_.fine.micro
@@ -445,14 +426,14 @@ class TextureReader {
   const Law& law_;
   SceneContext& context_;
   FeatureScales scales_;
-  std::size_t as_ = 0;
+  std::optional<FeatureScale> as_;  ///< nothing: by wavelength
   TexturePart part_;
 };
 
 }  // namespace
 
 const char* mapping_name(IntermediateSurface surface) {
-  return mapping_names()[static_cast<std::size_t>(surface)].c_str();
+  return to_string(surface);
 }
 
 Result<TexturePart> read_texture(ObjectReader& surface, const TextureHost& host, const Law& law,

@@ -15,11 +15,6 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& channel_names() {
-  static const std::vector<std::string> names{"automatic", "luminance", "red", "green", "blue", "alpha"};
-  return names;
-}
-
 /// Reads a formula's parameters; every one that the formula does not take is refused by name. What they must be to one
 /// another (a flank within its rim) the formula itself checks.
 class HeightGeneratorReader {
@@ -200,7 +195,7 @@ Status HeightSourceReader::read_image_source(const std::string& file) {
   }
   image_ = std::move(*image);
   reader_.write(key_, path_.string());
-  channel_ = static_cast<Channel>(reader_.choice("channel", channel_names(), 0));
+  channel_ = reader_.choice("channel", Channel::automatic);
   return read_sidecar();
 }
 

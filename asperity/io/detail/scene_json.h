@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/units.h"
 
@@ -73,6 +74,18 @@ class ObjectReader {
   std::string text(std::string_view key, std::string fallback);
   /// One of `names`; answers its position, `fallback` when the key is absent.
   std::size_t choice(std::string_view key, std::span<const std::string> names, std::size_t fallback);
+  /// One of an enum's names.
+  template <HasNames E>
+  E choice(std::string_view key, E fallback) {
+    return Names<E>::table[choice(key, all_names<E>(), place_of_name(fallback))].value;
+  }
+  /// One of an enum's names, or "auto": nothing. `fallback` when the key is absent.
+  template <HasNames E>
+  std::optional<E> choice_or_auto(std::string_view key, std::optional<E> fallback = {}) {
+    const std::size_t absent = fallback ? place_of_name(*fallback) + 1 : 0;
+    const std::size_t place = choice(key, with_auto(all_names<E>()), absent);
+    return place == 0 ? std::nullopt : std::optional<E>(Names<E>::table[place - 1].value);
+  }
   /// Three lengths (m, or texts with units).
   Vec3 lengths(std::string_view key, const Vec3& fallback);
   /// One quantity for both, or two (SI, or texts with units).
@@ -100,6 +113,10 @@ class ObjectReader {
   [[nodiscard]] SceneJson& canonical() { return canonical_; }
 
  private:
+  static std::vector<std::string> with_auto(std::vector<std::string> names) {
+    names.insert(names.begin(), "auto");
+    return names;
+  }
   double value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range);
 
   const SceneJson* json_;

@@ -10,15 +10,6 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& detail_names() {
-  static const std::vector<std::string> names{"dilation", "low_pass"};
-  return names;
-}
-const std::vector<std::string>& solid_names() {
-  static const std::vector<std::string> names{"waves", "lattice", "rings", "noise", "pulse"};
-  return names;
-}
-
 constexpr double fastest = 100.0;       // m/s
 constexpr double most_frequency = 1e4;  // Hz: beyond any device's rate
 constexpr double most_factor = 1e3;
@@ -28,8 +19,7 @@ Result<CoatLayer> read_solid(ObjectReader& reader) {
   reader.refuse({"height_map", "channel", "height", "height_range", "offset", "white_is", "repeat", "tile", "filter"},
                 "by a solid");
   SolidSpec spec;
-  const std::size_t kind = reader.choice("solid", solid_names(), 3);
-  spec.kind = static_cast<SolidKind>(kind);
+  spec.kind = reader.choice("solid", SolidKind::noise);
   const bool noise = spec.kind == SolidKind::noise;
   const bool round = spec.kind == SolidKind::rings || spec.kind == SolidKind::pulse;
   const bool directed = spec.kind == SolidKind::waves;
@@ -62,11 +52,10 @@ Result<CoatLayer> read_solid(ObjectReader& reader) {
 
 /// Reads a layer that is a map, laid as the coat is.
 Result<CoatLayer> read_map(ObjectReader& reader, const LayerHost& host, SceneContext& context) {
-  static const std::vector<std::string> filters{"nearest", "bilinear", "bspline"};
   HeightSourceReader source(reader, context, "height_map", "layer", host.mean_edge);
   ASPERITY_CHECK(source.read_source());
   ASPERITY_CHECK(source.read_scale(1.0));
-  const auto filter = static_cast<Reconstruction>(reader.choice("filter", filters, 2));
+  const auto filter = reader.choice("filter", Reconstruction::quadratic_bspline);
   CoatLayer layer;
   Vec2 tile = host.tile;
   if (host.triplanar) {
@@ -163,7 +152,7 @@ Result<std::optional<DetailSettings>> read_detail(ObjectReader& coat) {
   const SceneJson wrapped = json->is_string() ? SceneJson{{"kind", *json}} : *json;
   ObjectReader reader(wrapped, coat.place_of("detail"), "detail");
   DetailSettings detail;
-  detail.kind = static_cast<DetailKind>(reader.choice("kind", detail_names(), 1));
+  detail.kind = reader.choice("kind", DetailKind::low_pass);
   detail.finest = reader.quantity("finest", Dimension::length, 0.0, Range::not_negative());
   detail.levels = reader.integer("levels", 0, 0, DetailPyramid::most_levels);
   ASPERITY_CHECK(reader.status());
@@ -187,7 +176,7 @@ Result<std::vector<CoatLayer>> read_layers(ObjectReader& coat, const LayerHost& 
     if (!solid) {
       reader.refuse({"amplitude", "wavelength", "direction", "centre", "phase", "frequency", "drift", "octaves",
                      "persistence", "seed"},
-                    "by a map (\"solid\" names one of waves, lattice, rings, noise, pulse)");
+                    fmt::format("by a map (\"solid\" names one of {})", name_list<SolidKind>()));
       ASPERITY_CHECK(reader.status());
     }
     Result<CoatLayer> layer = solid ? read_solid(reader) : read_map(reader, host, context);

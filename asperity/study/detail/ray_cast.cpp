@@ -1,14 +1,12 @@
 #include "asperity/study/detail/ray_cast.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <variant>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/render/fine_contact.h"
 
 namespace asperity {
@@ -106,22 +104,18 @@ Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& di
   return {};
 }
 
-/// Calls work(row) for every row, shared out over threads; the calling thread takes part.
+/// Calls work(row, caster) for every row, shared out over threads, each with a caster of its own.
 template <class Work>
-void for_each_row(int rows, int threads, const Work& work) {
-  std::atomic<int> next{0};
-  const auto run = [&](bool first) {
-    auto worker = work();
-    for (int row = next++; row < rows; row = next++) worker(row, first);
-  };
-  std::vector<std::thread> others;
-  try {
-    for (int i = 1; i < threads; ++i) others.emplace_back(run, false);
-  } catch (const std::system_error&) {
-    // Fewer threads do the same work.
-  }
-  run(true);
-  for (std::thread& other : others) other.join();
+void for_each_row(const Scene& scene, const Camera& camera, std::size_t rows, const ParallelSettings& settings,
+                  const Work& work) {
+  std::vector<RayCaster> casters;
+  for (unsigned i = 0; i < parallel_workers(rows, settings); ++i) casters.emplace_back(scene, camera);
+  parallel_for(rows, settings, [&](std::size_t row, unsigned worker) { work(static_cast<int>(row), casters[worker]); });
+}
+
+/// Rows one by one, `from` to `to` of the whole picture.
+ParallelSettings picture_rows(unsigned threads, const Progress& progress, double from, double to) {
+  return {.threads = threads, .progress = &progress, .what = "drawing the picture", .from = from, .to = to};
 }
 
 /// Pixel positions 0, block, 2 block ..., and the last one.
@@ -172,21 +166,16 @@ struct Lattice {
   }
 };
 
-template <class Done>
-Lattice cast_lattice(const Scene& scene, const Camera& camera, int block, int threads, const Done& done) {
+Lattice cast_lattice(const Scene& scene, const Camera& camera, int block, const ParallelSettings& settings) {
   Lattice lattice{places(static_cast<int>(camera.width), block), places(static_cast<int>(camera.height), block), {}};
   PixelGrid& knots = lattice.knots;
   knots.columns = static_cast<int>(lattice.xs.size());
   knots.rows = static_cast<int>(lattice.ys.size());
   knots.pixels.resize(lattice.xs.size() * lattice.ys.size());
-  for_each_row(knots.rows, threads, [&] {
-    return [&, caster = RayCaster(scene, camera)](int row, bool first) mutable {
-      const double y = lattice.ys[static_cast<std::size_t>(row)] + 0.5;
-      for (int column = 0; column < knots.columns; ++column) {
-        knots.pixels[knots.index(column, row)] = caster.cast(lattice.xs[static_cast<std::size_t>(column)] + 0.5, y);
-      }
-      if (first) done(static_cast<double>(row + 1) / knots.rows);
-    };
+  for_each_row(scene, camera, lattice.ys.size(), settings, [&](int row, RayCaster& caster) {
+    const double y = lattice.ys[static_cast<std::size_t>(row)] + 0.5;
+    for (int column = 0; column < knots.columns; ++column)
+      knots.pixels[knots.index(column, row)] = caster.cast(lattice.xs[static_cast<std::size_t>(column)] + 0.5, y);
   });
   return lattice;
 }
@@ -272,28 +261,23 @@ Pixel RayCaster::cast(double x, double y) {
   return nearest;
 }
 
-PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, int threads, const Progress& progress) {
+PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, unsigned threads, const Progress& progress) {
   const double share = block == 1 ? 1.0 : 0.4;
-  const Lattice lattice = cast_lattice(scene, camera, block, threads, [&](double done) {
-    if (progress) progress("drawing the picture", share * done);
-  });
+  const Lattice lattice = cast_lattice(scene, camera, block, picture_rows(threads, progress, 0.0, share));
   if (block == 1) return lattice.knots;
   PixelGrid grid{static_cast<int>(camera.width), static_cast<int>(camera.height), {}};
   grid.pixels.resize(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows));
-  const int cell_rows = lattice.knots.rows - 1;
-  for_each_row(cell_rows, threads, [&] {
-    return [&, caster = RayCaster(scene, camera)](int row, bool first) mutable {
-      for (int column = 0; column + 1 < lattice.knots.columns; ++column)
-        fill_cell(lattice.cell(column, row), camera, caster, grid);
-      if (first && progress) progress("drawing the picture", share + (1.0 - share) * (row + 1) / cell_rows);
-    };
-  });
+  for_each_row(scene, camera, lattice.ys.size() - 1, picture_rows(threads, progress, share, 1.0),
+               [&](int row, RayCaster& caster) {
+                 for (int column = 0; column + 1 < lattice.knots.columns; ++column)
+                   fill_cell(lattice.cell(column, row), camera, caster, grid);
+               });
   return grid;
 }
 
-CastCost measure_cost(const Scene& scene, const Camera& camera, int block, int threads) {
+CastCost measure_cost(const Scene& scene, const Camera& camera, int block, unsigned threads) {
   const auto begin = std::chrono::steady_clock::now();
-  const Lattice lattice = cast_lattice(scene, camera, block, threads, [](double) {});
+  const Lattice lattice = cast_lattice(scene, camera, block, {.threads = threads});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   double uneven = 0.0;
   double cells = 0.0;
@@ -306,7 +290,7 @@ CastCost measure_cost(const Scene& scene, const Camera& camera, int block, int t
 }
 
 std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most,
-                                  int threads) {
+                                  unsigned threads) {
   std::vector<std::pair<double, std::size_t>> candidates;
   for (int y = 0; y < grid.rows; ++y) {
     for (int x = 0; x < grid.columns; ++x) {
@@ -321,19 +305,14 @@ std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, cons
   // In the order of the image, so that a ray's hints serve the next one.
   std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   std::vector<EdgePixel> edges(candidates.size());
-  constexpr std::size_t batch = 64;
-  for_each_row(static_cast<int>((edges.size() + batch - 1) / batch), threads, [&] {
-    return [&, caster = RayCaster(scene, camera)](int row, bool) mutable {
-      const std::size_t begin = static_cast<std::size_t>(row) * batch;
-      for (std::size_t i = begin; i < std::min(edges.size(), begin + batch); ++i) {
-        edges[i].index = candidates[i].second;
-        const auto columns = static_cast<std::size_t>(grid.columns);
-        const auto x = static_cast<double>(edges[i].index % columns);
-        const auto y = static_cast<double>(edges[i].index / columns);
-        for (int k = 0; k < 4; ++k)
-          edges[i].quarters[k] = caster.cast(x + (k % 2 ? 0.75 : 0.25), y + (k / 2 ? 0.75 : 0.25));
-      }
-    };
+  const ParallelSettings settings{.grain = 64, .threads = threads};
+  for_each_row(scene, camera, edges.size(), settings, [&](int i, RayCaster& caster) {
+    EdgePixel& edge = edges[static_cast<std::size_t>(i)];
+    edge.index = candidates[static_cast<std::size_t>(i)].second;
+    const auto columns = static_cast<std::size_t>(grid.columns);
+    const auto x = static_cast<double>(edge.index % columns);
+    const auto y = static_cast<double>(edge.index / columns);
+    for (int k = 0; k < 4; ++k) edge.quarters[k] = caster.cast(x + (k % 2 ? 0.75 : 0.25), y + (k / 2 ? 0.75 : 0.25));
   });
   return edges;
 }

@@ -45,16 +45,17 @@ struct PixelGrid {
   [[nodiscard]] const Pixel& at(int x, int y) const { return pixels[index(x, y)]; }
 };
 
-/// Casts the camera's image with `threads` threads. A ray each `block` pixels each way; in between, cells whose corners
-/// lie on one smooth patch are interpolated and all others cast pixel by pixel. Block 1 casts every pixel. [main]
-PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, int threads, const Progress& progress);
+/// Casts the camera's image with at most `threads` threads (0: one a processor). A ray each `block` pixels each way; in
+/// between, cells whose corners lie on one smooth patch are interpolated and all others cast pixel by pixel. Block 1
+/// casts every pixel. [main]
+PixelGrid cast_image(const Scene& scene, const Camera& camera, int block, unsigned threads, const Progress& progress);
 
 /// What a picture will take, from the lattice of an image with a ray each `block` pixels.
 struct CastCost {
   double seconds_per_ray = 0.0;  ///< wall time, all threads together
   double uneven = 0.0;           ///< share of the cells that are not smooth
 };
-CastCost measure_cost(const Scene& scene, const Camera& camera, int block, int threads);
+CastCost measure_cost(const Scene& scene, const Camera& camera, int block, unsigned threads);
 
 /// A pixel on an edge of the image and what four rays within it saw.
 struct EdgePixel {
@@ -65,6 +66,6 @@ struct EdgePixel {
 /// Casts the pixels that differ most from a neighbour (outline, jump of depth, bend of more than about 11 degrees), at
 /// most `most` of them, four times. [main]
 std::vector<EdgePixel> cast_edges(const Scene& scene, const Camera& camera, const PixelGrid& grid, std::size_t most,
-                                  int threads);
+                                  unsigned threads);
 
 }  // namespace asperity

@@ -135,18 +135,17 @@ void ramp(const ParametricSettings& s, const Vec2& uv, ParametricJet& out, Norma
 
 struct Entry {
   ParametricShape shape;
-  const char* name;
   std::vector<std::string> parameters;
 };
 
 const std::vector<Entry>& table() {
   static const std::vector<Entry> entries = {
-      {ParametricShape::plane, "plane", {"width", "depth", "tile"}},
-      {ParametricShape::cylinder, "cylinder", {"radius", "height", "tile"}},
-      {ParametricShape::sphere, "sphere", {"radius", "tile"}},
-      {ParametricShape::torus, "torus", {"radius", "tube", "tile"}},
-      {ParametricShape::vase, "vase", {"radius", "height", "neck", "tile"}},
-      {ParametricShape::ramp, "ramp", {"scale", "tile"}},
+      {ParametricShape::plane, {"width", "depth", "tile"}},
+      {ParametricShape::cylinder, {"radius", "height", "tile"}},
+      {ParametricShape::sphere, {"radius", "tile"}},
+      {ParametricShape::torus, {"radius", "tube", "tile"}},
+      {ParametricShape::vase, {"radius", "height", "neck", "tile"}},
+      {ParametricShape::ramp, {"scale", "tile"}},
   };
   return entries;
 }
@@ -245,25 +244,20 @@ Status check_shape(const ParametricSettings& s) {
 }
 
 const char* parametric_name(ParametricShape shape) {
-  return entry_of(shape).name;
+  return to_string(shape);
 }
 
 Result<ParametricShape> parametric_by_name(std::string_view name) {
-  std::string names;
-  for (const Entry& entry : table()) {
-    if (name == entry.name) return entry.shape;
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", entry.name);
-  }
-  return Error{ErrorCode::bad_value, fmt::format("is \"{}\", which is no parametric surface", name), {}, {}, names};
+  if (const std::optional<ParametricShape> shape = value_named<ParametricShape>(name)) return *shape;
+  return Error{ErrorCode::bad_value,
+               fmt::format("is \"{}\", which is no parametric surface", name),
+               {},
+               {},
+               name_list<ParametricShape>()};
 }
 
 const std::vector<std::string>& parametric_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> out;
-    for (const Entry& entry : table()) out.emplace_back(entry.name);
-    return out;
-  }();
-  return names;
+  return all_names<ParametricShape>();
 }
 
 const std::vector<std::string>& parametric_parameters(ParametricShape shape) {
