@@ -10,8 +10,8 @@ namespace asperity {
 
 /// Where the probe is, as the device side reports it. World frame, SI.
 struct ProbeSample {
-  Pose pose;
-  Twist twist;  ///< estimated by the device side; its error is the estimator's to state
+  Pose pose = {};
+  Twist twist = {};  ///< estimated by the device side; its error is the estimator's to state
   /// Bit i: button i of the device is pressed. Recorded in traces, set and read by nothing yet: it stays 0 until
   /// devices report it.
   std::uint32_t buttons = 0;
