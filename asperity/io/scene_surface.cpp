@@ -108,11 +108,11 @@ Status close(Instance& instance, const SceneJson& json, const std::string& place
   }
   Result<ClosedRelief> baked = close_relief(relief, settings, context.progress);
   if (!baked) return std::move(baked).error().at(place);
-  Result<ReliefSurface> wearing = wear_closed(relief, *baked);
+  auto wearing = wear_closed(relief, *baked);
   if (!wearing) return std::move(wearing).error().at(place);
   context.note(fmt::format("coat on \"{}\": {}", instance.name, baked->report.summary()));
   coat.take("closing", std::move(reader));
-  instance.surface = std::make_shared<const ReliefSurface>(std::move(*wearing));
+  instance.surface = std::move(*wearing);
   instance.closed_from = std::make_shared<const ClosedFrom>(ClosedFrom{before, std::move(*baked)});
   return success();
 }
