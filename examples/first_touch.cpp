@@ -3,19 +3,15 @@
 
 #include <cstdio>
 
-#include "asperity/field/mesostructure_generators.h"
-#include "asperity/geometry/generators.h"
-#include "asperity/render/step.h"
+#include "asperity/asperity.h"
 
 using namespace asperity;
 
 int main() {
-  const auto rings = generate_height_map({.kind = MesostructureKind::rings}, Wrap::repeat, Reconstruction::bilinear);
-  const auto maps = std::make_shared<Mesostructure>(Mesostructure::build(rings.value(), Vec2(0.1, 0.1)).value());
-  const TriangleMesh sheet = TriangleMesh::build(plane_grid(0.1, 0.1, 8, 8)).value();
-  const Coat coat = Coat::build(sheet, maps, {}).value();
-  const auto relief = std::make_shared<ReliefSurface>(MeshSurface(TriangleIndex::build(sheet)), coat);
-  const Scene scene = Scene::build({{.name = "sheet", .surface = relief, .law = HeightFieldLaw{}}}, 0.0).value();
+  const auto sheet = make_mesh_surface(plane_grid(0.1, 0.1, 8, 8)).value();
+  const auto rings = generate_height_map({.kind = MesostructureKind::rings}).value();
+  const auto relief = make_relief(*sheet, Mesostructure::build(rings, Vec2(0.1, 0.1)).value()).value();
+  const Scene scene = Scene::build({{.name = "sheet", .surface = relief}}).value();
   ProxyState state;
   for (double z = 1.1e-3; z > -1e-3; z -= 2e-4) {
     const ForceSample felt = step(scene, state, {.pose = {.position = {0.0, 0.0, z}}}, Seconds(1e-3));

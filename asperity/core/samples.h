@@ -11,8 +11,10 @@ namespace asperity {
 
 /// Where the probe is, as the device side reports it. World frame, SI.
 struct ProbeSample {
-  Pose pose;
-  Twist twist;  ///< estimated by the device side; its error is the estimator's to state
+  Pose pose = {};
+  Twist twist = {};  ///< estimated by the device side; its error is the estimator's to state
+  /// Bit i: button i of the device is pressed. Recorded in traces, set and read by nothing yet: it stays 0 until
+  /// devices report it.
   std::uint32_t buttons = 0;
   Seconds time{0.0};  ///< since the start of the run
 };
@@ -93,6 +95,8 @@ struct ForceParts {
 
 /// What the hand should feel. World frame, SI.
 struct ForceSample {
+  /// `wrench.torque` is zero until tools have a shape: a point or a ball is not turned. Recorded in traces, rendered by
+  /// no device yet.
   Wrench wrench;
   ForceParts parts;           ///< of the wrench's force; not recorded in traces
   Vec3 proxy = Vec3::Zero();  ///< the probe's constrained twin (m); equals the probe's position in free space

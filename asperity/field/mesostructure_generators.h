@@ -104,7 +104,8 @@ MesostructureSpec completed(MesostructureSpec spec);
 /// Heights (m) of a mesostructure. Errors: bad_value naming the member and what it accepts. [build]
 Result<std::vector<float>> generate_heights(const MesostructureSpec& spec);
 /// The same as a map. [build]
-Result<HeightMap> generate_height_map(const MesostructureSpec& spec, Wrap wrap, Reconstruction reconstruction);
+Result<HeightMap> generate_height_map(const MesostructureSpec& spec, Wrap wrap = Wrap::repeat,
+                                      Reconstruction reconstruction = Reconstruction::quadratic_bspline);
 
 /// Paper's name of a kind: "H_0" to "H_7". [any]
 const char* paper_name(MesostructureKind kind);

@@ -20,7 +20,7 @@ class CoatReader {
         context_(context),
         source_(reader_, context, "height_map", "coat", mesh.mean_edge()) {}
 
-  Result<ScenePart<Coat>> read() {
+  Result<ScenePart<CoatSource>> read() {
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(source_.read_source());
     read_mapping();
@@ -46,9 +46,7 @@ class CoatReader {
     ASPERITY_TRY(parts.layers, read_layers(reader_, host, context_));
     ASPERITY_TRY(parts.materials, read_material_maps(reader_, host, context_));
     ASPERITY_CHECK(reader_.status());
-    Result<Coat> coat = Coat::build(mesh_, std::move(parts), settings);
-    if (!coat) return std::move(coat).error().at(reader_.place());
-    return ScenePart<Coat>{std::move(*coat), std::move(reader_.canonical())};
+    return ScenePart<CoatSource>{{std::move(parts), settings}, std::move(reader_.canonical())};
   }
 
  private:
@@ -222,8 +220,8 @@ double texture_unit(const TriangleMesh& mesh) {
   return area > 0.0 ? std::sqrt(mesh.report().area / area) : mesh.mean_edge();
 }
 
-Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
-                                  SceneContext& context) {
+Result<ScenePart<CoatSource>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
+                                        SceneContext& context) {
   return CoatReader(json, place, mesh, context).read();
 }
 

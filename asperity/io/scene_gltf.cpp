@@ -69,8 +69,8 @@ bool has_gltf_materials(const std::filesystem::path& path) {
                               [](const GltfMaterial& material) { return material.felt(); });
 }
 
-Result<Coat> gltf_coat(const std::filesystem::path& path, const MeshSource& source, const TriangleMesh& mesh,
-                       const Material& own, const Stitching& stitching, double scale, SceneContext& context) {
+Result<CoatSource> gltf_coat(const std::filesystem::path& path, const MeshSource& source, const TriangleMesh& mesh,
+                             const Material& own, const Stitching& stitching, double scale, SceneContext& context) {
   if (context.progress) context.progress("reading the materials of the glTF file", 0.0);
   ASPERITY_TRY(const GltfModel model, read_gltf_model(path));
   ASPERITY_TRY(const std::vector<std::uint32_t> from, source_of_faces(source, mesh));
@@ -122,7 +122,7 @@ Result<Coat> gltf_coat(const std::filesystem::path& path, const MeshSource& sour
                            heights == 0 ? " (felt by the law \"force-shading\"; the proxy feels the geometry)" : ""));
   if (heights > 0 && scale != 1.0)
     context.note(fmt::format("coat: heights are scaled with the model, by {:.4g}", scale));
-  return Coat::build(mesh, std::move(parts), settings);
+  return CoatSource{std::move(parts), settings};
 }
 
 }  // namespace asperity

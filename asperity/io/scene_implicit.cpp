@@ -269,10 +269,13 @@ class ImplicitReader {
     ASPERITY_TRY(TriangleMesh mesh, build_mesh(std::move(part), surface_, context_));
     if (context_.progress) context_.progress("building the search structure", 0.0);
     mesh_ = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
-    if (const SceneJson* coat = surface_.raw("coat")) {
-      ASPERITY_TRY(ScenePart<Coat> read, read_coat(*coat, surface_.place_of("coat"), mesh_->mesh(), context_));
+    if (const SceneJson* json = surface_.raw("coat")) {
+      const std::string place = surface_.place_of("coat");
+      ASPERITY_TRY(ScenePart<CoatSource> read, read_coat(*json, place, mesh_->mesh(), context_));
+      Result<Coat> coat = Coat::build(mesh_->mesh(), std::move(read.value.parts), read.value.settings);
+      if (!coat) return std::move(coat).error().at(place);
       surface_.write("coat", std::move(read.canonical));
-      coat_ = std::make_unique<Coat>(std::move(read.value));
+      coat_ = std::make_unique<Coat>(std::move(*coat));
     }
     return success();
   }

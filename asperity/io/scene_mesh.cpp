@@ -169,10 +169,12 @@ class GeneratorReader {
                    fmt::format("{}.{}", place, key),
                    "no such key here"};
     }
-    ASPERITY_TRY(ScenePart<Coat> coat, read_coat(json, place, base, context_));
-    coat.canonical.erase("normals");
-    reader_.write("mesostructure", std::move(coat.canonical));
-    return std::move(coat.value);
+    ASPERITY_TRY(ScenePart<CoatSource> source, read_coat(json, place, base, context_));
+    Result<Coat> coat = Coat::build(base, std::move(source.value.parts), source.value.settings);
+    if (!coat) return std::move(coat).error().at(place);
+    source.canonical.erase("normals");
+    reader_.write("mesostructure", std::move(source.canonical));
+    return coat;
   }
 
   MeshSource cup() {

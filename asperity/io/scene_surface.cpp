@@ -62,18 +62,18 @@ Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& c
 }
 
 /// The relief, with a note on what building it had to change. `place`: of what it is made from.
-Result<Surface> build_relief(MeshSurface base, Coat coat, ObjectReader& surface, SceneContext& context,
+Result<Surface> build_relief(MeshSurface base, CoatSource coat, ObjectReader& surface, SceneContext& context,
                              const std::string& name, const std::string& place) {
   ReliefSettings settings;
   settings.on_overlap = surface.choice("on_overlap", settings.on_overlap);
   settings.directions = surface.choice("shell_directions", settings.directions);
   ASPERITY_CHECK(surface.status());
   if (context.progress) context.progress("fitting the relief", 0.0);
-  Result<ReliefSurface> relief = ReliefSurface::build(std::move(base), std::move(coat), settings);
+  auto relief = make_relief(std::move(base), std::move(coat.parts), coat.settings, settings);
   if (!relief) return std::move(relief).error().at(place);
-  if (const std::string advice = relief->report().advice(); !advice.empty())
+  if (const std::string advice = (*relief)->report().advice(); !advice.empty())
     context.note(fmt::format("coat on \"{}\": {}", name, advice));
-  return Surface(std::make_shared<const ReliefSurface>(std::move(relief).value()));
+  return Surface(std::move(*relief));
 }
 
 /// Closes a relief as the coat's `closing` says. What the closed one cannot carry over is refused.
@@ -101,20 +101,20 @@ Status close(Instance& instance, const SceneJson& json, const std::string& place
   }
   Result<ClosedRelief> baked = close_relief(relief, settings, context.progress);
   if (!baked) return std::move(baked).error().at(place);
-  Result<ReliefSurface> wearing = wear_closed(relief, *baked);
+  auto wearing = wear_closed(relief, *baked);
   if (!wearing) return std::move(wearing).error().at(place);
   context.note(fmt::format("coat on \"{}\": {}", instance.name, baked->report.summary()));
   coat.take("closing", std::move(reader));
-  instance.surface = std::make_shared<const ReliefSurface>(std::move(*wearing));
+  instance.surface = std::move(*wearing);
   instance.closed_from = std::make_shared<const ClosedFrom>(ClosedFrom{before, std::move(*baked)});
   return success();
 }
 
 /// The coat that the materials of a glTF file make. `json` may be nullptr.
-Result<ScenePart<Coat>> read_gltf_coat(const SceneJson* json, const std::string& place,
-                                       const std::filesystem::path& path, const MeshSource& source,
-                                       const TriangleMesh& mesh, const Material& own, double scale,
-                                       SceneContext& context) {
+Result<ScenePart<CoatSource>> read_gltf_coat(const SceneJson* json, const std::string& place,
+                                             const std::filesystem::path& path, const MeshSource& source,
+                                             const TriangleMesh& mesh, const Material& own, double scale,
+                                             SceneContext& context) {
   static const SceneJson by_default = SceneJson{{"from", "gltf"}};
   ObjectReader reader(json != nullptr ? *json : by_default, place, "coat");
   static const std::vector<std::string> sources{"gltf"};
@@ -127,9 +127,9 @@ Result<ScenePart<Coat>> read_gltf_coat(const SceneJson* json, const std::string&
     ASPERITY_TRY(stitching, read_stitching(*given, reader.place_of("stitching"), context, reader));
   }
   ASPERITY_CHECK(reader.status());
-  Result<Coat> coat = gltf_coat(path, source, mesh, own, stitching, scale, context);
+  Result<CoatSource> coat = gltf_coat(path, source, mesh, own, stitching, scale, context);
   if (!coat) return std::move(coat).error().at(place);
-  return ScenePart<Coat>{std::move(*coat), std::move(reader.canonical())};
+  return ScenePart<CoatSource>{std::move(*coat), std::move(reader.canonical())};
 }
 
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
@@ -167,9 +167,11 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
   instance.sides = read_sides(reader, base, context, instance.name);
   if (baked != nullptr) {
     const std::string place = reader.place_of("texture.features");
-    Result<Coat> coat = Coat::build(base.mesh(), std::move(baked), CoatSettings{});
-    if (!coat) {
-      if (coat.error().place != "mapping") return std::move(coat).error().at(place);
+    CoatSource coat;
+    coat.parts.maps.push_back(std::move(baked));
+    Result<Surface> relief = build_relief(std::move(base), std::move(coat), reader, context, instance.name, place);
+    if (!relief) {
+      if (relief.error().place != place + ".mapping") return std::move(relief).error();
       // The coat lies by coordinates that were made from the mapping, which is what the scene says.
       return Error{
           ErrorCode::mismatch,
@@ -180,8 +182,7 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
           "another mapping (\"plane\" for a sheet) or another \"axis\" or \"origin\" of it; \"as\": \"texture\" "
           "needs no area"};
     }
-    ASPERITY_TRY(instance.surface,
-                 build_relief(std::move(base), std::move(*coat), reader, context, instance.name, place));
+    instance.surface = std::move(*relief);
     return success();
   }
   if (coat_json == nullptr && !gltf) {
@@ -190,8 +191,9 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
     return reader.status();
   }
   const std::string place = reader.place_of("coat");
-  Result<ScenePart<Coat>> coat = gltf ? read_gltf_coat(coat_json, place, file, source, base.mesh(), own, scale, context)
-                                      : read_coat(*coat_json, place, base.mesh(), context);
+  Result<ScenePart<CoatSource>> coat =
+      gltf ? read_gltf_coat(coat_json, place, file, source, base.mesh(), own, scale, context)
+           : read_coat(*coat_json, place, base.mesh(), context);
   if (!coat) return std::move(coat).error();
   ASPERITY_TRY(instance.surface,
                build_relief(std::move(base), std::move(coat->value), reader, context, instance.name, place));

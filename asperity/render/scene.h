@@ -60,22 +60,23 @@ struct ClosedFrom {
   ClosedRelief closed;
 };
 
-/// One touchable thing: a surface at a place, felt by a law, of a material.
+/// One touchable thing: a surface at a place, felt by a law, of a material. Every member names its default, so that
+/// compilers do not warn of those that {.name = ..., .surface = ...} leaves out.
 struct Instance {
-  std::string name;
-  Surface surface;
+  std::string name = {};
+  Surface surface = {};
   Law law = ProxyLaw{};
-  Material material;
+  Material material = {};
   /// Texture, lay and maps of friction beside what is in the surface; nullptr: none.
-  std::shared_ptr<const FineFeatures> fine;
+  std::shared_ptr<const FineFeatures> fine = nullptr;
   Sides sides = Sides::both;
-  Pose world_from_object;
-  Motion motion;      ///< from there, by the clock of the probe
-  double zoom = 1.0;  ///< filled by Scene::build: by how much a material that varies over the surface is magnified
+  Pose world_from_object = {};
+  Motion motion = {};  ///< from there, by the clock of the probe
+  double zoom = 1.0;   ///< filled by Scene::build: by how much a material that varies over the surface is magnified
   /// What the surface was made from, where it is a closed relief; nullptr: it is not.
-  std::shared_ptr<const ClosedFrom> closed_from;
+  std::shared_ptr<const ClosedFrom> closed_from = nullptr;
   /// Law dense-mesh: what is felt. Filled by Scene::build, which takes one that is here already if it fits.
-  std::shared_ptr<const DenseMesh> dense;
+  std::shared_ptr<const DenseMesh> dense = nullptr;
 };
 
 /// What an implicit surface is made of at p (object frame): stored there, or the instance's own. [servo]
@@ -92,7 +93,7 @@ struct SceneSettings {
   double probe_radius = 0.0;  ///< m, workspace: of the probe's tip; 0 is a point
   /// Radius (m, workspace) of the tip whose path a point follows on coats with levels of detail by dilation; 0: none.
   double tip_radius = 0.0;
-  View view;
+  View view = {};
   /// Over how long a change of the scene is spread, as far as the tank pays for it (s); 0: felt at once.
   Seconds handover{0.01};
   /// Power (W) that moving, deforming and changing surfaces may give to the hand beyond what it has spent on them: 0,
@@ -113,7 +114,7 @@ class Scene {
 
   /// The same with all that can be set. Errors: those above, and bad_value (view, motion, a time or power below 0).
   /// [build]
-  static Result<Scene> build(std::vector<Instance> instances, const SceneSettings& settings,
+  static Result<Scene> build(std::vector<Instance> instances, const SceneSettings& settings = {},
                              std::vector<FieldEffect> effects = {});
 
   [[nodiscard]] std::span<const Instance> instances() const noexcept { return instances_; }

@@ -9,6 +9,7 @@
 #include "asperity/core/fixed_vector.h"
 #include "asperity/surface/detail/halfspaces.h"
 #include "asperity/surface/detail/relief_weights.h"
+#include "asperity/surface/relief_bake.h"
 #include "asperity/surface/relief_descent.h"
 
 namespace asperity {
@@ -406,22 +407,6 @@ RayStart start_over(const ReliefSurface& surface, const ReliefFrame& frame, doub
   return {false, own, {frame, u, v}};
 }
 
-/// From a texel beside a triangle to the one nearest to it that is at most `border` texels beside.
-std::ptrdiff_t nearest_within(const AtlasTexel& texel, double border, int texels) {
-  const double margin = (border - 0.7) / texels;
-  double u = texel.u;
-  double v = texel.v;
-  for (int i = 0; i < 3; ++i) {
-    u = std::max(u, -margin);
-    v = std::max(v, -margin);
-    const double beyond = 0.5 * std::max(0.0, u + v - 1.0 - margin);
-    u -= beyond;
-    v -= beyond;
-  }
-  return static_cast<std::ptrdiff_t>(std::lround((u - texel.u) * texels)) * texel.right +
-         static_cast<std::ptrdiff_t>(std::lround((v - texel.v) * texels)) * texel.up;
-}
-
 /// Raises texels that did not settle as those around them were raised on average: a hole would be a trap.
 void patch(ClosedRelief& closed, const std::vector<AtlasTexel>& unsettled, int texels) {
   std::vector<std::size_t> open;
@@ -541,7 +526,8 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
   std::vector<std::pair<std::size_t, std::size_t>> copies;
   std::vector<std::pair<std::size_t, std::size_t>> continued;
   const auto source_of = [texels](const AtlasTexel& texel, double border) {
-    return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(texel.index) + nearest_within(texel, border, texels));
+    return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(texel.index) +
+                                    nearest_texel_within(texel, border, texels));
   };
   ReliefFrame frame;
   std::uint32_t of = no_index;
@@ -621,36 +607,13 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
   return closed;
 }
 
-Result<ReliefSurface> wear_closed(const ReliefSurface& original, const ClosedRelief& closed,
-                                  const ReliefSettings& settings) {
-  const TriangleMesh& worn = original.base().mesh();
-  if (closed.atlas.corner_uvs.size() != worn.triangles().size()) {
-    return closing_error(
-        ErrorCode::mismatch,
-        fmt::format("has {} triangles, the mesh {}", closed.atlas.corner_uvs.size(), worn.triangles().size()), "closed",
-        "the closed relief of this very surface");
-  }
-  MeshSource source;
-  source.positions.assign(worn.positions().begin(), worn.positions().end());
-  source.triangles.assign(worn.triangles().begin(), worn.triangles().end());
-  source.corner_uvs = closed.atlas.corner_uvs;
-  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(std::move(source), MeshBuildSettings{1.0, false}));
-  ASPERITY_TRY(HeightMap heights, HeightMap::build(closed.atlas.heights, closed.atlas.width, closed.atlas.height,
-                                                   Wrap::clamp, Reconstruction::quadratic_bspline));
-  const double texel = closed.report.texel_size;
-  ASPERITY_TRY(Mesostructure maps,
-               Mesostructure::build(std::move(heights), Vec2(texel * closed.atlas.width, texel * closed.atlas.height)));
-  CoatSettings coat_settings;
-  coat_settings.stitching.folds = FoldMode::round;
-  // Half a texel: enough to join what differs by rounding and reconstruction alone.
-  coat_settings.stitching.rho = std::clamp(0.6 / closed.settings.texels, 0.005, 0.05);
-  coat_settings.stitching.most_rounding = 0.25 * texel;
-  ASPERITY_TRY(Coat coat, Coat::build(mesh, std::make_shared<const Mesostructure>(std::move(maps)), coat_settings));
+Result<std::shared_ptr<const ReliefSurface>> wear_closed(const ReliefSurface& original, const ClosedRelief& closed,
+                                                         const ReliefSettings& settings) {
+  ASPERITY_TRY(TriangleMesh mesh, with_atlas_uvs(original.base().mesh(), closed.atlas));
   ReliefSettings same = settings;
   same.directions = original.report().directions_relaxed ? ShellDirections::relaxed : ShellDirections::least_squares;
-  ASPERITY_TRY(ReliefSurface surface,
-               ReliefSurface::build(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat), same));
-  if (surface.shell().directions != original.shell().directions) {
+  ASPERITY_TRY(std::shared_ptr<const ReliefSurface> surface, wear_atlas(mesh, closed.atlas, same));
+  if (surface->shell().directions != original.shell().directions) {
     return closing_error(ErrorCode::bad_mesh, "the filled relief is higher than the shell over its faces holds",
                          "radius", "a smaller radius, a lower relief, or a finer base mesh");
   }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -63,7 +64,7 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
 /// its own height (folds `round` in a narrow band: both sides of an edge describe the same surface). Only the heights
 /// are carried over: other maps of the coat are laid by UVs that the mesh no longer has. Errors: those of Coat and
 /// ReliefSurface; mismatch (another mesh). [build]
-Result<ReliefSurface> wear_closed(const ReliefSurface& original, const ClosedRelief& closed,
-                                  const ReliefSettings& settings = {});
+Result<std::shared_ptr<const ReliefSurface>> wear_closed(const ReliefSurface& original, const ClosedRelief& closed,
+                                                         const ReliefSettings& settings = {});
 
 }  // namespace asperity

@@ -2,6 +2,11 @@
 
 namespace asperity {
 
+Result<std::shared_ptr<const MeshSurface>> make_mesh_surface(MeshSource source, const MeshBuildSettings& settings) {
+  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(std::move(source), settings));
+  return std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
+}
+
 Vec3 pseudonormal(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric) noexcept {
   const Vec3 own = mesh.face_normal(face);
   int zeros = 0;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "asperity/geometry/mesh_refitter.h"
 #include "asperity/geometry/triangle_index.h"
 #include "asperity/surface/surface.h"
@@ -36,6 +38,10 @@ class MeshSurface {
   TriangleIndex index_;
 };
 static_assert(SurfaceQuery<MeshSurface>);
+
+/// A mesh as a reader or a generator gives it, ready to be touched: welded, checked and searched by a bounding volume
+/// hierarchy. `settings.scale` is the source's unit (m). Errors: those of TriangleMesh::build. [build]
+Result<std::shared_ptr<const MeshSurface>> make_mesh_surface(MeshSource source, const MeshBuildSettings& settings = {});
 
 /// A mesh whose vertices the caller moves, as surfaces that can be touched: see MeshRefitter.
 class DeformableMesh {

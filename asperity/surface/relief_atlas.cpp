@@ -35,6 +35,21 @@ Error bake_error(std::string what, std::string place, std::string accepted) {
 
 }  // namespace
 
+std::ptrdiff_t nearest_texel_within(const AtlasTexel& texel, double border, int texels) noexcept {
+  const double margin = (border - 0.7) / texels;
+  double u = texel.u;
+  double v = texel.v;
+  for (int i = 0; i < 3; ++i) {
+    u = std::max(u, -margin);
+    v = std::max(v, -margin);
+    const double beyond = 0.5 * std::max(0.0, u + v - 1.0 - margin);
+    u -= beyond;
+    v -= beyond;
+  }
+  return static_cast<std::ptrdiff_t>(std::lround((u - texel.u) * texels)) * texel.right +
+         static_cast<std::ptrdiff_t>(std::lround((v - texel.v) * texels)) * texel.up;
+}
+
 std::size_t atlas_texels(std::size_t faces, int texels) noexcept {
   const Layout layout(faces, texels);
   return static_cast<std::size_t>(layout.width()) * static_cast<std::size_t>(layout.height());
@@ -69,6 +84,7 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const Texe
   ReliefAtlas atlas;
   atlas.width = layout.width();
   atlas.height = layout.height();
+  atlas.texels = texels;
   atlas.heights.assign(static_cast<std::size_t>(atlas.width) * static_cast<std::size_t>(atlas.height), 0.0F);
   atlas.corner_uvs.resize(faces);
   const double inset = border + 0.5;

@@ -23,10 +23,12 @@ struct ReliefAtlas {
   int height = 0;                                ///< texels
   std::vector<float> heights;                    ///< m, row 0 on top, as HeightMap::build takes them
   std::vector<std::array<Vec2f, 3>> corner_uvs;  ///< per triangle, for MeshSource
+  int texels = 0;                                ///< along each edge of a triangle
 };
 
 /// Bakes with `texels` texels along each edge of a triangle. The heights are along the directions of `shell`, which the
-/// mesh that wears the atlas must have too (the same positions give the same directions). Errors: bad_value (texels
+/// mesh that wears the atlas must have too (the same positions give the same directions). For those who find heights
+/// on their own; of a formula relief_bake.h finds them. Errors: bad_value (texels
 /// below 2, a height that is not finite, naming the face), too_large. [build]
 Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, int texels, const RayHeight& ray,
                                 const Progress& progress = {});
@@ -46,6 +48,9 @@ using TexelHeight = std::function<double(const AtlasTexel&)>;
 /// The same from heights by texel, asked once for each, face by face. [build]
 Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& height,
                                 const Progress& progress = {});
+/// From a texel beside a triangle to the one nearest to it that is at most `border` texels beside: by how much its
+/// index differs. `texels` along each edge. [any]
+std::ptrdiff_t nearest_texel_within(const AtlasTexel& texel, double border, int texels) noexcept;
 /// Texels that the atlas would have. [any]
 std::size_t atlas_texels(std::size_t faces, int texels) noexcept;
 

@@ -105,6 +105,20 @@ Result<ReliefSurface> ReliefSurface::build(MeshSurface base, Coat coat, const Re
   return relief;
 }
 
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, CoatParts parts, const CoatSettings& coat,
+                                                         const ReliefSettings& relief) {
+  ASPERITY_TRY(Coat laid, Coat::build(base.mesh(), std::move(parts), coat));
+  ASPERITY_TRY(ReliefSurface surface, ReliefSurface::build(std::move(base), std::move(laid), relief));
+  return std::make_shared<const ReliefSurface>(std::move(surface));
+}
+
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, Mesostructure maps, const CoatSettings& coat,
+                                                         const ReliefSettings& relief) {
+  CoatParts parts;
+  parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(maps)));
+  return make_relief(std::move(base), std::move(parts), coat, relief);
+}
+
 Status ReliefSurface::settle(const ReliefSettings& settings) {
   settings_ = settings;
   if (settings.on_overlap == OnOverlap::refuse && !report_.fits()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -169,5 +170,15 @@ class ReliefSurface {
   double fold_depth_ = 0.0;  ///< by how much rounding folds may move the surface (m)
 };
 static_assert(SurfaceQuery<ReliefSurface> && HasPrisms<ReliefSurface>);
+
+/// Lays a coat of these parts on a mesh and makes the relief of both. The mesh is named once, so the coat can be on no
+/// other than the one it is touched with. Errors: those of Coat::build, then those of ReliefSurface::build. [build]
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, CoatParts parts,
+                                                         const CoatSettings& coat = {},
+                                                         const ReliefSettings& relief = {});
+/// The same of one mesostructure all over the mesh. [build]
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, Mesostructure maps,
+                                                         const CoatSettings& coat = {},
+                                                         const ReliefSettings& relief = {});
 
 }  // namespace asperity

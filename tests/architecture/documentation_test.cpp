@@ -10,19 +10,10 @@
 namespace asperity::architecture {
 namespace {
 
-/// Headers that say so at their head are not for users of the module.
-bool is_private(const SourceFile& header) {
-  const auto end = header.lines.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, header.lines.size()));
-  return std::any_of(header.lines.begin(), end, [](const std::string& line) {
-    return line.rfind("// ", 0) == 0 &&
-           (line.find("Private to ") != std::string::npos || line.find("private to ") != std::string::npos);
-  });
-}
-
 TEST(Documentation, TypesAndFunctionsHaveDocstrings) {
   std::size_t checked = 0;
   for (const SourceFile& header : files_below("asperity/", {".h"})) {
-    if (is_private(header)) continue;
+    if (says_private(header)) continue;
     for (const Declaration& declaration : declarations(header)) {
       ++checked;
       EXPECT_TRUE(declaration.documented()) << header.path << ":" << declaration.line << ": " << declaration.text;
@@ -33,7 +24,7 @@ TEST(Documentation, TypesAndFunctionsHaveDocstrings) {
 
 TEST(Documentation, FreeFunctionsNameTheThreadTheyAreFor) {
   for (const SourceFile& header : files_below("asperity/", {".h"})) {
-    if (is_private(header)) continue;
+    if (says_private(header)) continue;
     for (const Declaration& declaration : declarations(header)) {
       if (!declaration.is_function) continue;
       const std::array<const char*, 4> tags = {"[servo]", "[build]", "[main]", "[any]"};
@@ -51,28 +42,74 @@ TEST(Documentation, HeadersBeginWithPragmaOnce) {
   }
 }
 
-/// The lines of a file from the first that begins with `begin` up to the next that is `end`, both left out.
-std::vector<std::string> lines_between(const SourceFile& file, const std::string& begin, const std::string& end) {
-  const auto starts = [&](const std::string& line) { return line.rfind(begin, 0) == 0; };
-  auto first = std::find_if(file.lines.begin(), file.lines.end(), starts);
-  if (first == file.lines.end()) return {};
-  return {++first, std::find(first, file.lines.end(), end)};
+/// A file of which there is one.
+const SourceFile& file_at(const std::string& path) {
+  const auto same = [&](const SourceFile& file) { return file.path == path; };
+  const auto found = std::find_if(text_files().begin(), text_files().end(), same);
+  if (found != text_files().end()) return *found;
+  ADD_FAILURE() << "there is no " << path;
+  static const SourceFile none;
+  return none;
 }
 
-TEST(Documentation, FirstProgramHasTenLinesAndStandsInTheReadme) {
-  const std::vector<SourceFile> examples = files_below("examples/first_touch.cpp", {".cpp"});
-  ASSERT_EQ(examples.size(), 1U);
-  const std::vector<std::string> body = lines_between(examples.front(), "int main() {", "}");
-  const auto is_code = [](const std::string& line) { return line.find_first_not_of(" {}") != std::string::npos; };
-  EXPECT_GT(std::count_if(body.begin(), body.end(), is_code), 0);
-  EXPECT_LE(std::count_if(body.begin(), body.end(), is_code), 10);
+/// The blocks of a page that begin with `fence` ("```cpp").
+std::vector<std::vector<std::string>> blocks_of(const SourceFile& page, const std::string& fence) {
+  std::vector<std::vector<std::string>> blocks;
+  for (auto line = page.lines.begin(); line != page.lines.end(); ++line) {
+    if (*line != fence) continue;
+    const auto end = std::find(line + 1, page.lines.end(), "```");
+    blocks.emplace_back(line + 1, end);
+    if (end == page.lines.end()) break;
+    line = end;
+  }
+  return blocks;
+}
 
-  const std::vector<SourceFile> readme = files_below("README.md", {".md"});
-  if (readme.empty()) GTEST_SKIP() << "there is no README.md yet";
-  const std::vector<std::string>& lines = examples.front().lines;
-  const auto program = std::find(lines.begin(), lines.end(), "#include <cstdio>");
-  EXPECT_EQ(lines_between(readme.front(), "```cpp", "```"), std::vector<std::string>(program, lines.end()))
-      << "README.md shows another program than examples/first_touch.cpp";
+/// An example without what is said at its head.
+std::vector<std::string> program_of(const SourceFile& example) {
+  const auto starts = [](const std::string& line) { return line.rfind("#include", 0) == 0; };
+  return {std::find_if(example.lines.begin(), example.lines.end(), starts), example.lines.end()};
+}
+
+TEST(Documentation, FirstProgramHasTenLines) {
+  const std::vector<std::string>& lines = file_at("examples/first_touch.cpp").lines;
+  const auto begin = std::find(lines.begin(), lines.end(), "int main() {");
+  const auto end = std::find(begin, lines.end(), "}");
+  ASSERT_NE(end, lines.end());
+  EXPECT_GT(end - begin, 1);
+  EXPECT_LE(end - begin - 1, 10);
+}
+
+// The tests compile and run the examples, and the package test what the README's CMake lists say.
+TEST(Documentation, ReadmeShowsTheExamples) {
+  const auto shown = blocks_of(file_at("README.md"), "```cpp");
+  const std::array<const char*, 2> examples = {"examples/first_touch.cpp", "examples/touch_mesh.cpp"};
+  ASSERT_EQ(shown.size(), examples.size());
+  for (std::size_t i = 0; i < shown.size(); ++i) EXPECT_EQ(shown[i], program_of(file_at(examples[i]))) << examples[i];
+  EXPECT_EQ(blocks_of(file_at("README.md"), "```cmake").size(), 1U);
+}
+
+TEST(Documentation, BakingShowsItsExample) {
+  const auto shown = blocks_of(file_at("docs/methods/baking.md"), "```cpp");
+  ASSERT_EQ(shown.size(), 1U);
+  EXPECT_EQ(shown.front(), program_of(file_at("examples/bake_formula.cpp")));
+}
+
+// What the README tells to run is there.
+TEST(Documentation, ReadmeInstallsBeforeItFinds) {
+  const SourceFile& readme = file_at("README.md");
+  const auto line_with = [&](const std::string& text) {
+    const auto holds = [&](const std::string& line) { return line.find(text) != std::string::npos; };
+    return std::find_if(readme.lines.begin(), readme.lines.end(), holds);
+  };
+  const std::array<const char*, 5> steps = {"scripts/install-packages", "cmake --preset release",
+                                            "cmake --build build/release", "cmake --install build/release --prefix",
+                                            "find_package(asperity"};
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    ASSERT_NE(line_with(steps[i]), readme.lines.end()) << steps[i];
+    if (i == 0) continue;
+    EXPECT_LT(line_with(steps[i - 1]), line_with(steps[i])) << steps[i];
+  }
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ std::ptrdiff_t place_in_order(const std::string& module) {
 
 TEST(Layers, EveryModuleHasItsPlaceInTheOrder) {
   for (const SourceFile& file : files_below("asperity/", {".h", ".cpp"})) {
+    if (file.path == umbrella) continue;
     EXPECT_LT(place_in_order(module_of(file.path)), static_cast<std::ptrdiff_t>(order.size())) << file.path;
   }
 }
@@ -43,6 +44,13 @@ TEST(Layers, ModulesIncludeOnlyModulesAboveThem) {
   }
 }
 
+/// What cmake/AsperityInstall.cmake takes along of the headers below asperity/.
+bool is_installed(const std::string& header) {
+  const std::vector<std::string> left_out = {"/detail/", "/io/vdb/", "/io/vtk/", "/study/nlopt/"};
+  return std::none_of(left_out.begin(), left_out.end(),
+                      [&](const std::string& folder) { return header.find(folder) != std::string::npos; });
+}
+
 // Headers in detail/ are not installed: an installed one that includes them would not compile.
 TEST(Layers, DetailIsTheModulesOwn) {
   int seen = 0;
@@ -58,11 +66,38 @@ TEST(Layers, DetailIsTheModulesOwn) {
       const std::string folder = name.substr(1, detail);  // "asperity/MODULE/"
       EXPECT_TRUE(of_a_module && file.path.compare(0, folder.size(), folder) == 0)
           << file.path << ":" << i + 1 << ": " << name << " is another module's own";
-      const bool is_public = file.path.ends_with(".h") && file.path.find("/detail/") == std::string::npos;
+      const bool is_public = file.path.ends_with(".h") && is_installed(file.path);
       EXPECT_FALSE(is_public) << file.path << ":" << i + 1 << ": " << name << " is not installed, this header is";
     }
   }
   EXPECT_GT(seen, 40);
+}
+
+TEST(Layers, TheUmbrellaIncludesEveryPublicHeaderUpToIo) {
+  std::vector<std::string> wanted;
+  for (const SourceFile& header : files_below("asperity/", {".h"})) {
+    if (header.path == umbrella || module_of(header.path) == "study") continue;
+    if (!is_installed(header.path) || says_private(header)) continue;
+    wanted.push_back('"' + header.path + '"');
+  }
+  std::vector<std::string> found;
+  const std::vector<SourceFile> headers = files_below(umbrella, {".h"});
+  ASSERT_EQ(headers.size(), 1U);
+  for (const std::string& line : headers.front().lines) {
+    if (const std::string name = included(line); !name.empty()) found.push_back(name);
+  }
+  std::sort(found.begin(), found.end());
+  std::sort(wanted.begin(), wanted.end());
+  EXPECT_EQ(found, wanted);
+}
+
+TEST(Layers, TheUmbrellaIsForProgramsAlone) {
+  for (const char* folder : {"asperity/", "apps/", "bench/"}) {
+    for (const SourceFile& file : files_below(folder, {".h", ".cpp"})) {
+      for (std::size_t i = 0; i < file.lines.size(); ++i)
+        EXPECT_NE(included(file.lines[i]), '"' + std::string(umbrella) + '"') << file.path << ":" << i + 1;
+    }
+  }
 }
 
 TEST(Layers, OutsideLibrariesStayInTheirPlaces) {

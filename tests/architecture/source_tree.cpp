@@ -197,6 +197,14 @@ std::string module_of(const std::string& path) {
   return std::regex_search(path, match, pattern) ? match[1].str() : "";
 }
 
+bool says_private(const SourceFile& header) {
+  const auto end = header.lines.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, header.lines.size()));
+  return std::any_of(header.lines.begin(), end, [](const std::string& line) {
+    return line.rfind("// ", 0) == 0 &&
+           (line.find("Private to ") != std::string::npos || line.find("private to ") != std::string::npos);
+  });
+}
+
 std::string included(const std::string& line) {
   static const std::regex pattern(R"(^\s*#\s*include\s*(".*"|<.*>))");
   std::smatch match;

@@ -19,6 +19,10 @@ std::vector<SourceFile> files_below(const std::string& folder, const std::vector
 
 /// "asperity/core/math.h" -> "core"; empty for a path that is not inside a module.
 std::string module_of(const std::string& path);
+/// The header with everything that a program needs.
+inline constexpr const char* umbrella = "asperity/asperity.h";
+/// Whether a header says at its head that it is not for users of its module.
+bool says_private(const SourceFile& header);
 /// What an include line includes, its quotes or brackets kept: `"asperity/core/math.h"`, `<png.h>`; empty for other
 /// lines.
 std::string included(const std::string& line);

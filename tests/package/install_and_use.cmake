@@ -1,5 +1,6 @@
-# Installs the build in BUILD into a folder of its own, then configures, builds and runs the project in CONSUMER with it.
-# cmake -DBUILD=... -DCONSUMER=... -DFOLDER=... -DGENERATOR=... -DCOMPILER=... -DFLAGS=... -P install_and_use.cmake
+# Installs the build in BUILD into a folder of its own, looks at what was installed, then configures, builds and runs two
+# projects with it: the one in CONSUMER, and the README's.
+# cmake -DBUILD=... -DSOURCE=... -DCONSUMER=... -DFOLDER=... -DGENERATOR=... -DCOMPILER=... -DFLAGS=... -P install_and_use.cmake
 
 function(must_succeed what)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -7,17 +8,75 @@ function(must_succeed what)
     message(FATAL_ERROR "${what} failed (${code}):\n${output}")
   endif()
   message(STATUS "${what}: done")
+  set(output "${output}" PARENT_SCOPE)
 endfunction()
 
 file(REMOVE_RECURSE "${FOLDER}")
-must_succeed("Installing" "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${FOLDER}/prefix")
-# The source tree must play no part any more: the consumer sees the prefix alone.
-must_succeed("Configuring the consumer" "${CMAKE_COMMAND}" -S "${CONSUMER}" -B "${FOLDER}/build" -G "${GENERATOR}"
-  "-DCMAKE_PREFIX_PATH=${FOLDER}/prefix" "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+set(prefix "${FOLDER}/prefix")
+must_succeed("Installing" "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
+
+# Only public headers, and each of the project's own that they include is among them.
+file(GLOB_RECURSE headers RELATIVE "${prefix}/include" "${prefix}/include/*.h")
+list(LENGTH headers count)
+if(count LESS 100)
+  message(FATAL_ERROR "Only ${count} headers were installed")
+endif()
+foreach(header IN LISTS headers)
+  if(header MATCHES "/detail/" OR header MATCHES "^asperity/(io/(vdb|vtk)|study/nlopt)/")
+    message(FATAL_ERROR "${header} is no public header, and was installed")
+  endif()
+  file(STRINGS "${prefix}/include/${header}" includes REGEX "^[ \t]*#[ \t]*include[ \t]*\"")
+  foreach(line IN LISTS includes)
+    string(REGEX REPLACE "^[^\"]*\"([^\"]*)\".*$" "\\1" name "${line}")
+    if(NOT EXISTS "${prefix}/include/${name}")
+      message(FATAL_ERROR "${header} includes ${name}, which was not installed")
+    endif()
+  endforeach()
+endforeach()
+message(STATUS "Looking at ${count} headers: done")
+
+# Those of the last module first: what a header forgot to include from a module above its own is missing then.
+set(modules core geometry field material surface render device servo io study)
+list(REVERSE modules)
+set(every_header "// Every installed header of the library, from the last module to the first.\n")
+foreach(module IN LISTS modules)
+  set(of_module ${headers})
+  list(FILTER of_module INCLUDE REGEX "^asperity/${module}/")
+  list(SORT of_module ORDER DESCENDING)
+  foreach(header IN LISTS of_module)
+    string(APPEND every_header "#include \"${header}\"\n")
+  endforeach()
+endforeach()
+file(WRITE "${FOLDER}/every_header.cpp" "${every_header}#include \"asperity/asperity.h\"\n")
+
+# The source tree must play no part any more: the consumers see the prefix alone.
+set(toolchain -G "${GENERATOR}" "-DCMAKE_PREFIX_PATH=${prefix}" "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+must_succeed("Configuring the consumer" "${CMAKE_COMMAND}" -S "${CONSUMER}" -B "${FOLDER}/build" ${toolchain}
+  "-DEVERY_HEADER=${FOLDER}/every_header.cpp")
 must_succeed("Building the consumer" "${CMAKE_COMMAND}" --build "${FOLDER}/build")
 must_succeed("Running the consumer" "${FOLDER}/build/consumer" "${FOLDER}/box.ply")
 
-file(GLOB_RECURSE exported "${FOLDER}/prefix/*.cmake")
+# What the README tells to write, with its two programs.
+file(READ "${SOURCE}/README.md" readme)
+string(REGEX MATCH "```cmake\n([^`]*)```" block "${readme}")
+if(NOT block)
+  message(FATAL_ERROR "README.md shows no CMakeLists.txt")
+endif()
+file(WRITE "${FOLDER}/readme/CMakeLists.txt" "${CMAKE_MATCH_1}")
+file(COPY "${SOURCE}/examples/first_touch.cpp" "${SOURCE}/examples/touch_mesh.cpp" "${SOURCE}/examples/cube.obj"
+  DESTINATION "${FOLDER}/readme")
+must_succeed("Configuring the README's project" "${CMAKE_COMMAND}" -S "${FOLDER}/readme" -B "${FOLDER}/readme/build" ${toolchain})
+must_succeed("Building the README's project" "${CMAKE_COMMAND}" --build "${FOLDER}/readme/build")
+must_succeed("Running the README's first program" "${FOLDER}/readme/build/first_touch")
+if(NOT output MATCHES "-0\\.1 mm    0\\.600 N")
+  message(FATAL_ERROR "The README's first program says:\n${output}")
+endif()
+must_succeed("Running the README's second program" "${FOLDER}/readme/build/touch_mesh" "${FOLDER}/readme/cube.obj")
+if(NOT output MATCHES "-1\\.0 mm    1\\.000 N")
+  message(FATAL_ERROR "The README's second program says:\n${output}")
+endif()
+
+file(GLOB_RECURSE exported "${prefix}/*.cmake")
 foreach(file IN LISTS exported)
   file(READ "${file}" text)
   string(FIND "${text}" "${SOURCE}/" place)

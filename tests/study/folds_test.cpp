@@ -204,7 +204,7 @@ struct Cup {
                must(HeightMap::build(heights, spec.size, spec.size, Wrap::repeat, Reconstruction::quadratic_bspline)),
                Mapping::uv);
     const ClosedRelief maps = must(close_relief(*open, {2e-3, 32}));
-    closed = std::make_shared<const ReliefSurface>(must(wear_closed(*open, maps)));
+    closed = must(wear_closed(*open, maps));
   }
 
   /// Through the bottom of the cup, `heading` degrees from x.

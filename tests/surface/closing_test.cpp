@@ -21,7 +21,7 @@ struct Closed {
 
 Closed closed(std::shared_ptr<const ReliefSurface> open, double radius, int texels = 0) {
   ClosedRelief maps = must(close_relief(*open, {radius, texels}));
-  ReliefSurface surface = must(wear_closed(*open, maps));
+  ReliefSurface surface = *must(wear_closed(*open, maps));
   return {std::move(open), std::move(maps), std::move(surface)};
 }
 

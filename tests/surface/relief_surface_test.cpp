@@ -189,5 +189,56 @@ TEST(ReliefSurfaceTest, bounds_hold_the_relief) {
   EXPECT_EQ(relief->prisms().half_height(), relief->coat().amplitude_bound());
 }
 
+// The mesh is named once; what comes out is what a coat laid by hand gives.
+TEST(MakeRelief, is_the_relief_of_a_coat_on_that_very_mesh) {
+  const auto base = must(make_mesh_surface(icosphere(2, 0.02)));
+  const auto by_hand = coated(icosphere(2, 0.02), wavy_map(0.5e-3), Mapping::triplanar);
+  const Mesostructure maps = must(Mesostructure::build(wavy_map(0.5e-3), Vec2(0.01, 0.01)));
+  CoatSettings coat;
+  coat.mapping = Mapping::triplanar;
+  const auto made = must(make_relief(*base, maps, coat));
+  EXPECT_EQ(&made->base().mesh(), &base->mesh());
+  EXPECT_EQ(&made->rest_mesh(), &base->mesh());
+  CoatParts parts;
+  parts.maps.push_back(std::make_shared<const Mesostructure>(maps));
+  const auto from_parts = must(make_relief(*base, std::move(parts), coat));
+  Rng rng(8);
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 p = rng.uniform(0.019, 0.022) * random_direction(rng);
+    Hint a;
+    Hint b;
+    Hint c;
+    const Foot foot = by_hand->closest(p, infinity, a);
+    EXPECT_EQ(made->closest(p, infinity, b).point, foot.point);
+    EXPECT_EQ(from_parts->closest(p, infinity, c).point, foot.point);
+  }
+}
+
+TEST(MakeRelief, hands_on_what_coat_and_shell_refuse) {
+  MeshSource bald = icosphere(1, 0.02);
+  bald.corner_uvs.clear();
+  const auto without_uvs = must(make_mesh_surface(std::move(bald)));
+  const Mesostructure maps = must(Mesostructure::build(wavy_map(0.5e-3), Vec2(0.01, 0.01)));
+  const auto unmapped = make_relief(*without_uvs, maps);
+  ASSERT_FALSE(unmapped);
+  EXPECT_EQ(unmapped.error().code, ErrorCode::mismatch);
+  const auto no_map = make_relief(*without_uvs, CoatParts{});
+  ASSERT_FALSE(no_map);
+
+  const auto coarse = must(make_mesh_surface(icosphere(1, 0.02)));
+  const Mesostructure high = must(Mesostructure::build(wavy_map(0.05), Vec2(0.01, 0.01)));
+  const auto folded = make_relief(*coarse, high, {}, {ShellDirections::least_squares, OnOverlap::refuse});
+  ASSERT_FALSE(folded);
+  EXPECT_EQ(folded.error().code, ErrorCode::bad_mesh);
+}
+
+TEST(MakeMeshSurface, scales_and_refuses) {
+  EXPECT_NEAR(must(make_mesh_surface(box_mesh(Vec3(40.0, 40.0, 40.0)), {.scale = 1e-3}))->bounds().upper.z(), 0.02,
+              1e-15);
+  const auto empty = make_mesh_surface(MeshSource{});
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, ErrorCode::bad_mesh);
+}
+
 }  // namespace
 }  // namespace asperity::relief_surface_test

@@ -34,7 +34,7 @@ Result<std::shared_ptr<const MaterialMaps>> read_material_maps(ObjectReader& coa
 /// Whether this is a glTF file whose materials can be felt. [build]
 bool has_gltf_materials(const std::filesystem::path& path);
 /// The coat that they make; `source` is what `mesh` was built from, `scale` what the model was scaled by. [build]
-Result<Coat> gltf_coat(const std::filesystem::path& path, const MeshSource& source, const TriangleMesh& mesh,
-                       const Material& own, const Stitching& stitching, double scale, SceneContext& context);
+Result<CoatSource> gltf_coat(const std::filesystem::path& path, const MeshSource& source, const TriangleMesh& mesh,
+                             const Material& own, const Stitching& stitching, double scale, SceneContext& context);
 
 }  // namespace asperity

@@ -128,9 +128,14 @@ Status read_implicit(ObjectReader& surface, const ImplicitFeel& feel, SceneConte
 
 /// Mean length (m) of one unit of the mesh's texture coordinates; its mean edge where it has none. [any]
 double texture_unit(const TriangleMesh& mesh);
-/// A coat for `mesh`. [build]
-Result<ScenePart<Coat>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
-                                  SceneContext& context);
+/// What a coat is made of before it lies on its mesh.
+struct CoatSource {
+  CoatParts parts;
+  CoatSettings settings;
+};
+/// What the coat of `mesh` is made of. [build]
+Result<ScenePart<CoatSource>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
+                                        SceneContext& context);
 
 /// One entry of `surfaces`. [build]
 Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context);

@@ -1,12 +1,10 @@
 // Writes a mesh, reads it back, touches it, and checks the force: headers, libraries and what they need are all there.
+// The one include comes first, so that nothing before it helps.
+
+#include "asperity/asperity.h"
 
 #include <cmath>
 #include <cstdio>
-#include <memory>
-
-#include "asperity/geometry/generators.h"
-#include "asperity/io/mesh_io.h"
-#include "asperity/render/step.h"
 
 using namespace asperity;
 
@@ -15,13 +13,11 @@ namespace {
 Result<double> force_on_box(const char* file) {
   ASPERITY_CHECK(write_ply(file, box_mesh(Vec3(0.1, 0.1, 0.1))));
   ASPERITY_TRY(MeshSource source, read_mesh(file));
-  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(std::move(source)));
-  auto surface = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
   Instance box;
   box.name = "box";
-  box.surface = surface;
+  ASPERITY_TRY(box.surface, make_mesh_surface(std::move(source)));
   box.material.stiffness = 1000.0;
-  ASPERITY_TRY(const Scene scene, Scene::build({box}, 0.0));
+  ASPERITY_TRY(const Scene scene, Scene::build({box}));
   ProxyState state;
   ProbeSample probe;
   probe.pose.position = Vec3(0.01, 0.02, 0.06);

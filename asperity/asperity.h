@@ -1,0 +1,128 @@
+#pragma once
+// The engine in one include: every public header of the modules core, geometry, field, material, surface, render,
+// device, servo and io. Link asperity::asperity. For programs; the library itself includes what it uses.
+//
+// Left out are the parts that not every build has (io/vdb, io/vtk) and the workbench (asperity/study: metrics,
+// pictures, reports), which a program includes by name and links as asperity::study.
+
+// core: units, frames, Result, what goes into a tick and comes out of it
+#include "asperity/core/fixed_vector.h"
+#include "asperity/core/formulation.h"
+#include "asperity/core/frames.h"
+#include "asperity/core/math.h"
+#include "asperity/core/named_numbers.h"
+#include "asperity/core/progress.h"
+#include "asperity/core/result.h"
+#include "asperity/core/rng.h"
+#include "asperity/core/samples.h"
+#include "asperity/core/suggest.h"
+#include "asperity/core/trace_record.h"
+#include "asperity/core/units.h"
+
+// geometry: triangle meshes and how they are searched
+#include "asperity/geometry/bvh.h"
+#include "asperity/geometry/closest_point.h"
+#include "asperity/geometry/contact.h"
+#include "asperity/geometry/generators.h"
+#include "asperity/geometry/index_table.h"
+#include "asperity/geometry/mesh.h"
+#include "asperity/geometry/mesh_refitter.h"
+#include "asperity/geometry/octree.h"
+#include "asperity/geometry/simd_kernels.h"
+#include "asperity/geometry/triangle_contact.h"
+#include "asperity/geometry/triangle_index.h"
+#include "asperity/geometry/triangle_patch.h"
+#include "asperity/geometry/winding_number.h"
+
+// field: height maps, mesostructures, features, volumes, potentials
+#include "asperity/field/brick_file.h"
+#include "asperity/field/brick_store.h"
+#include "asperity/field/cell_polynomial.h"
+#include "asperity/field/derived_fields.h"
+#include "asperity/field/detail_pyramid.h"
+#include "asperity/field/grid_axis.h"
+#include "asperity/field/height_map.h"
+#include "asperity/field/height_range.h"
+#include "asperity/field/image.h"
+#include "asperity/field/material_brush.h"
+#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/mesostructure.h"
+#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure_library.h"
+#include "asperity/field/min_max_octree.h"
+#include "asperity/field/normal_map.h"
+#include "asperity/field/roughness.h"
+#include "asperity/field/scalar_field.h"
+#include "asperity/field/scalar_grid.h"
+#include "asperity/field/solid_mesostructure.h"
+#include "asperity/field/sparse_grid.h"
+#include "asperity/field/surface_features.h"
+#include "asperity/field/volume_generators.h"
+
+// material: stiffness, damping, friction
+#include "asperity/material/friction.h"
+#include "asperity/material/material.h"
+
+// surface: what is touched
+#include "asperity/surface/closing.h"
+#include "asperity/surface/coat.h"
+#include "asperity/surface/custom_surface.h"
+#include "asperity/surface/feature_mapping.h"
+#include "asperity/surface/implicit_surface.h"
+#include "asperity/surface/implicit_texture.h"
+#include "asperity/surface/iso_descent.h"
+#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/material_maps.h"
+#include "asperity/surface/mesh_surface.h"
+#include "asperity/surface/parametric_descent.h"
+#include "asperity/surface/parametric_patches.h"
+#include "asperity/surface/parametric_surface.h"
+#include "asperity/surface/prisms.h"
+#include "asperity/surface/relief_atlas.h"
+#include "asperity/surface/relief_bake.h"
+#include "asperity/surface/relief_descent.h"
+#include "asperity/surface/relief_frame.h"
+#include "asperity/surface/relief_mesh.h"
+#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/shell.h"
+#include "asperity/surface/stitching.h"
+#include "asperity/surface/surface.h"
+
+// render: laws, scene, step
+#include "asperity/render/custom_law.h"
+#include "asperity/render/energy_tank.h"
+#include "asperity/render/field_effects.h"
+#include "asperity/render/fine_contact.h"
+#include "asperity/render/fine_features.h"
+#include "asperity/render/laws.h"
+#include "asperity/render/scene.h"
+#include "asperity/render/step.h"
+#include "asperity/render/view.h"
+
+// device: where the probe is
+#include "asperity/device/device.h"
+#include "asperity/device/hand.h"
+#include "asperity/device/ideal_probe.h"
+#include "asperity/device/profile.h"
+#include "asperity/device/replay_device.h"
+#include "asperity/device/simulated_device.h"
+#include "asperity/device/stroke.h"
+#include "asperity/device/velocity_estimator.h"
+
+// servo: safety stage, session
+#include "asperity/servo/safety_stage.h"
+#include "asperity/servo/session.h"
+
+// io: files of meshes, images, volumes, scenes and traces
+#include "asperity/io/atomic_file.h"
+#include "asperity/io/embedded_file.h"
+#include "asperity/io/experiment.h"
+#include "asperity/io/gltf_material.h"
+#include "asperity/io/image_io.h"
+#include "asperity/io/mesh_io.h"
+#include "asperity/io/recorded_path.h"
+#include "asperity/io/sparse_io.h"
+#include "asperity/io/texture_waves.h"
+#include "asperity/io/trace_export.h"
+#include "asperity/io/trace_file.h"
+#include "asperity/io/volume_io.h"
