@@ -151,7 +151,8 @@ Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_
   ASPERITY_TRY(const Touch bare, touch_of(all.front(), surface, slide));
   for (const Fine& fine : all) {
     ASPERITY_TRY(Touch touch, touch_of(fine, surface, slide));
-    if (fine.name != bare_contact) group.on_top.push_back({fine.name, extra_ns(bare, touch, effort.warm)});
+    if (fine.name != bare_contact && effort.counted == 0)
+      group.on_top.push_back({fine.name, extra_ns(bare, touch, effort.warm)});
     rows.emplace_back(fine.name, [touch = std::move(touch)](std::size_t tick) mutable { return touch.tick(tick); });
   }
   group.rows = measure(rows, effort, clock_cost);

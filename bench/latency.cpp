@@ -25,6 +25,7 @@ struct Options {
   std::string only;  ///< one kind of group; empty: all
   std::size_t updates = 100000;
   std::size_t cold_updates = 200;
+  std::size_t counted = 0;  ///< ticks a row for a tool that counts; 0: timed
 };
 
 void say(const std::string& what) {
@@ -47,6 +48,16 @@ Status measure_all(const Options& options, Report& report) {
     volumes = {32, 64, 128};
     potentials = {3, 4, 5};
     moved = {1000, 10000};
+    map_size = 256;
+  }
+  if (options.counted > 0) {
+    // Under a tool that counts, everything is tens of times slower.
+    effort = {std::max<std::size_t>(100, options.counted / 4), 0, 1, options.counted};
+    meshes = {3, 5, 6};
+    reliefs = {3};
+    volumes = {64};
+    potentials = {3};
+    moved = {};
     map_size = 256;
   }
   const auto asked = [&](const char* kind) { return options.only.empty() || options.only == kind; };
@@ -91,6 +102,25 @@ Status measure_all(const Options& options, Report& report) {
   return success();
 }
 
+/// The counted rows one a line in the order in which they ran, for scripts/instructions. Answers the exit code.
+int say_counted(const std::vector<Group>& groups, std::size_t ticks) {
+  if (groups.empty()) {
+    fmt::print(stderr, "latency: rows of this kind are no ticks, and are not counted\n");
+    return 2;
+  }
+  int code = 0;
+  for (const Group& group : groups) {
+    for (const RowResult& row : group.rows) {
+      fmt::print("{} of {}\t{}\t{}\n", group.kind, group.size(), row.name, ticks);
+      if (row.answered_share >= 0.99) continue;
+      fmt::print(stderr, "latency: {} on {} answered only {:.1f} % of its updates\n", row.name, group.size(),
+                 100.0 * row.answered_share);
+      code = 1;
+    }
+  }
+  return code;
+}
+
 int run(const Options& options, const std::string& command) {
   Report report;
   report.command = command;
@@ -101,6 +131,7 @@ int run(const Options& options, const std::string& command) {
     fmt::print(stderr, "latency: {}\n", status.error().message());
     return 2;
   }
+  if (options.counted > 0) return say_counted(report.groups, options.counted);
   fmt::print("{}\n", options.json ? report.json() : report.text());
   if (!options.check) return 0;
   const std::vector<std::string> failures = report.failures();
@@ -128,6 +159,10 @@ int main(int argc, char** argv) {
     app.add_option("--cold-updates", options.cold_updates, "Cold updates a row; each sweeps 64 MB first")
         ->check(CLI::Range(1, 1000000))
         ->capture_default_str();
+    app.add_option("--count", options.counted,
+                   "No times: take every row so many ticks through asperity_counted_ticks, for scripts/instructions")
+        ->check(CLI::Range(1, 1000000))
+        ->excludes("--quick", "--check", "--json", "--updates", "--cold-updates");
     app.footer("Exit codes: 0 success, 1 a check does not hold, 2 bad input or usage.");
     std::string command = "latency";
     for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];

@@ -59,17 +59,26 @@ class Row {
   Row(std::string name, Update update)
       : name_(std::move(name)),
         block_(
-            [update = std::move(update)](std::size_t begin, std::size_t end, CacheSweep* sweep, Samples& out) mutable {
+            [update = std::move(update)](std::size_t begin, std::size_t end, CacheSweep* sweep, Samples* out) mutable {
+              std::size_t answers = 0;
+              if (out == nullptr) {
+                for (std::size_t tick = begin; tick < end; ++tick) answers += update(tick) ? 1U : 0U;
+                return answers;
+              }
               for (std::size_t tick = begin; tick < end; ++tick) {
                 if (sweep != nullptr) sweep->run();
                 const Clock::time_point start = Clock::now();
                 const bool answered = update(tick);
-                out.add(Clock::now() - start, answered);
+                out->add(Clock::now() - start, answered);
+                answers += answered ? 1U : 0U;
               }
+              return answers;
             }) {}
 
-  void warm(std::size_t begin, std::size_t end) { block_(begin, end, nullptr, warm_); }
-  void cold(std::size_t begin, std::size_t end, CacheSweep& sweep) { block_(begin, end, &sweep, cold_); }
+  void warm(std::size_t begin, std::size_t end) { block_(begin, end, nullptr, &warm_); }
+  void cold(std::size_t begin, std::size_t end, CacheSweep& sweep) { block_(begin, end, &sweep, &cold_); }
+  /// The updates and nothing else: no clock. Answers how many of them answered.
+  std::size_t plain(std::size_t begin, std::size_t end) { return block_(begin, end, nullptr, nullptr); }
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const Samples& warm_samples() const { return warm_; }
@@ -77,7 +86,7 @@ class Row {
 
  private:
   std::string name_;
-  std::function<void(std::size_t, std::size_t, CacheSweep*, Samples&)> block_;
+  std::function<std::size_t(std::size_t, std::size_t, CacheSweep*, Samples*)> block_;
   Samples warm_;
   Samples cold_;
 };
@@ -87,7 +96,9 @@ struct Effort {
   std::size_t warm = 100000;
   std::size_t cold = 200;
   std::size_t rounds = 5;  ///< the rows take turns, so that what else the machine does meets all of them alike
-  [[nodiscard]] std::size_t ticks() const { return warm + cold; }
+  /// Instead of timing: after `warm` updates so many in asperity_counted_ticks(), for a tool that counts. 0: timed.
+  std::size_t counted = 0;
+  [[nodiscard]] std::size_t ticks() const { return warm + cold + counted; }
 };
 
 /// A finished row.
@@ -98,7 +109,8 @@ struct RowResult {
   double answered_share = 0.0;  ///< of all updates
 };
 
-/// Measures the rows in turns: first all warm updates, then all cold ones.
+/// Measures the rows in turns: first all warm updates, then all cold ones. With effort.counted, one after the other and
+/// without a clock.
 std::vector<RowResult> measure(std::vector<Row>& rows, const Effort& effort, double clock_cost);
 
 }  // namespace asperity::bench

@@ -18,20 +18,31 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A row that slides a probe through `step`.
+/// How a row touches the mesh.
+struct Touch {
+  double radius = 0.0;    ///< m
+  bool friction = false;  ///< 0.3 / 0.2
+  bool resting = false;   ///< where the slide begins, and stays there
+};
+
+/// A row that takes a probe through `step`.
 Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSurface>& surface,
-                     const std::shared_ptr<const Slide>& slide, double radius) {
+                     const std::shared_ptr<const Slide>& slide, const Touch& touch) {
   Instance sphere;
   sphere.name = "sphere";
   sphere.surface = surface;
   sphere.sides = Sides::front;
-  ASPERITY_TRY(Scene scene, Scene::build({sphere}, radius));
+  if (touch.friction) {
+    sphere.material.static_friction = 0.3;
+    sphere.material.dynamic_friction = 0.2;
+  }
+  ASPERITY_TRY(Scene scene, Scene::build({sphere}, touch.radius));
   ProxyState state;
   ProbeSample probe;
   probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
   step(scene, state, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, radius, state, probe](std::size_t tick) mutable {
-    probe.pose.position = slide->probe(tick, radius);
+  return Row(name, [scene = std::move(scene), slide, touch, state, probe](std::size_t tick) mutable {
+    probe.pose.position = slide->probe(touch.resting ? 0 : tick, touch.radius);
     return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   });
 }
@@ -94,10 +105,15 @@ Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_
   const auto slide = std::make_shared<const Slide>(make_slide(surface->index(), effort.ticks()));
   group.largest_disagreement = largest_disagreement(*surface, *peer, *slide);
   std::vector<Row> rows;
-  ASPERITY_TRY(Row point, step_row(god_object_point, surface, slide, 0.0));
-  ASPERITY_TRY(Row ball, step_row(god_object_radius, surface, slide, 1e-3));
-  rows.push_back(std::move(point));
-  rows.push_back(std::move(ball));
+  const auto add = [&](const char* name, const Touch& touch) -> Status {
+    ASPERITY_TRY(Row row, step_row(name, surface, slide, touch));
+    rows.push_back(std::move(row));
+    return success();
+  };
+  ASPERITY_CHECK(add(god_object_point, {}));
+  ASPERITY_CHECK(add(god_object_radius, {.radius = 1e-3}));
+  ASPERITY_CHECK(add("god-object, point, resting", {.resting = true}));
+  ASPERITY_CHECK(add("proxy, point, friction", {.friction = true}));
   rows.push_back(closest_row(surface, slide));
   rows.push_back(closest_anew_row(surface, slide));
   rows.push_back(embree_row(embree_bounded, peer, slide, tracker_bound));

@@ -96,6 +96,14 @@ std::shared_ptr<const Slide> through(const TriangleIndex& index, std::vector<Vec
   return slide;
 }
 
+/// The first place of a slide, at every tick.
+std::shared_ptr<const Slide> resting_at(const Slide& slide) {
+  auto still = std::make_shared<Slide>();
+  still->direction.assign(slide.direction.size(), slide.direction.front());
+  still->surface.assign(slide.surface.size(), slide.surface.front());
+  return still;
+}
+
 /// Strokes over the cap around +z, up the slopes of the ridges and off their walls; between strokes the probe is lifted
 /// for one tick.
 std::shared_ptr<const Slide> strokes(const TriangleIndex& index, std::size_t ticks) {
@@ -178,6 +186,7 @@ Result<Group> measure_relief(int subdivisions, int map_size, const Effort& effor
   };
   ASPERITY_CHECK(add(proxy_cosine, charted, slide, ProxyLaw{}));
   ASPERITY_CHECK(add("proxy, cosine, triplanar", triplanar, slide, ProxyLaw{}));
+  ASPERITY_CHECK(add("proxy, cosine, UVs, resting", charted, resting_at(*slide), ProxyLaw{}));
   ASPERITY_CHECK(add("proxy, H_1, UVs", walls, over_ridges, ProxyLaw{}));
   ASPERITY_CHECK(add("height-field, cosine, UVs", charted, slide, HeightFieldLaw{}));
   ASPERITY_CHECK(add("mesostructure, cosine, UVs", charted, slide, MesostructureLaw{}));

@@ -59,12 +59,14 @@ struct Group {
   [[nodiscard]] const RowResult* row(const std::string& name) const;
 };
 
-/// An icosphere of 20 * 4^subdivisions triangles as it is: god-object, closest point, Embree. [build]
+/// An icosphere of 20 * 4^subdivisions triangles as it is: god-object, the proxy law with friction, closest point,
+/// Embree. [build]
 Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_cost);
 
 /// The same mesh with coats of map_size x map_size texels, by six charts of UVs and triplanar: the cosine of the relief
-/// test (0.30 mm from trough to crest, 4.9 mm long) and H_1 with its walls; proxy law with friction 0.3 / 0.2, and the
-/// consistent forms of Algorithms 1 and 2. On the two coarsest meshes also near an edge against inside a face. [build]
+/// test (0.30 mm from trough to crest, 4.9 mm long) and H_1 with its walls; proxy law with friction 0.3 / 0.2, sliding
+/// and at rest, and the consistent forms of Algorithms 1 and 2. On the two coarsest meshes also near an edge against
+/// inside a face. [build]
 Result<Group> measure_relief(int subdivisions, int map_size, const Effort& effort, double clock_cost);
 
 /// A sphere of 50 mm, slightly wavy, as the isosurface of count^3 samples over a cube of 120 mm: the proxy law with

@@ -207,27 +207,6 @@ const MeshSurface* base_of(const Surface& surface) noexcept {
   return mesh != nullptr ? mesh->get() : nullptr;
 }
 
-const ImplicitSurface* implicit_of(const Surface& surface) noexcept {
-  const auto* implicit = std::get_if<std::shared_ptr<const ImplicitSurface>>(&surface);
-  return implicit != nullptr ? implicit->get() : nullptr;
-}
-
-const ParametricSurface* parametric_of(const Surface& surface) noexcept {
-  const auto* parametric = std::get_if<std::shared_ptr<const ParametricSurface>>(&surface);
-  return parametric != nullptr ? parametric->get() : nullptr;
-}
-
-const CustomSurface* custom_of(const Surface& surface) noexcept {
-  const auto* custom = std::get_if<std::shared_ptr<const CustomSurface>>(&surface);
-  return custom != nullptr ? custom->get() : nullptr;
-}
-
-const IsoSurface* iso_of(const Surface& surface) noexcept {
-  if (const ImplicitSurface* implicit = implicit_of(surface)) return &implicit->iso();
-  const auto* iso = std::get_if<std::shared_ptr<const IsoSurface>>(&surface);
-  return iso != nullptr ? iso->get() : nullptr;
-}
-
 Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept {
   if (!surface.grid().has_materials()) return own;
   PointMaterial mine;
@@ -265,11 +244,6 @@ bool has_local_material(const Instance& instance) noexcept {
   if (const ReliefSurface* relief = relief_of(instance)) return relief->coat().materials() != nullptr;
   const ImplicitSurface* implicit = implicit_of(instance.surface);
   return implicit != nullptr && implicit->grid().has_materials();
-}
-
-const ReliefSurface* relief_of(const Instance& instance) noexcept {
-  const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
-  return relief != nullptr ? relief->get() : nullptr;
 }
 
 const TriangleMesh& base_mesh(const Surface& surface) {
@@ -430,12 +404,17 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
         instances[i], bounds.grown(scene.probe_radius() + attraction_reach(instances[i]) / settings.view.zoom +
                                    1e-6 * bounds.diagonal())));
   }
-  scene.instances_ = std::move(instances);
-  scene.effects_ = std::move(effects);
+  scene.reads_volumes_ = !effects.empty();
+  for (const Instance& instance : instances) {
+    scene.reads_volumes_ = scene.reads_volumes_ || iso_of(instance.surface) != nullptr;
+    scene.moves_ = scene.moves_ || instance.motion.moves();
+  }
+  scene.felt_ = std::move(instances);
+  scene.felt_effects_ = std::move(effects);
   if (settings.view.zoom != 1.0) {
-    scene.felt_ = scene.instances_;
+    scene.given_ = scene.felt_;
     for (Instance& instance : scene.felt_) magnify(instance, settings.view.zoom);
-    scene.felt_effects_ = scene.effects_;
+    scene.given_effects_ = scene.felt_effects_;
     for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
   }
   scene.epoch_ = next_epoch();
@@ -445,13 +424,14 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
 Box Scene::world_bounds() const noexcept {
   Box all;
   for (const Box& box : bounds_) all.include(box);
-  for (const FieldEffect& effect : effects_) all.include(transformed(effect.field->bounds(), effect.world_from_object));
+  for (const FieldEffect& effect : effects())
+    all.include(transformed(effect.field->bounds(), effect.world_from_object));
   return all;
 }
 
 std::size_t Scene::memory_bytes() const noexcept {
   std::size_t bytes = sizeof(*this);
-  for (const Instance& instance : instances_) {
+  for (const Instance& instance : instances()) {
     if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
     if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
       bytes += implicit->memory_bytes();
@@ -467,7 +447,7 @@ std::size_t Scene::memory_bytes() const noexcept {
       bytes += (*std::get_if<std::shared_ptr<const MeshSurface>>(&instance.surface))->index().memory_bytes();
     }
   }
-  for (const FieldEffect& effect : effects_) bytes += sizeof(FieldEffect) + effect.field->memory_bytes();
+  for (const FieldEffect& effect : effects()) bytes += sizeof(FieldEffect) + effect.field->memory_bytes();
   return bytes;
 }
 

@@ -34,16 +34,31 @@ using Surface = std::variant<std::shared_ptr<const MeshSurface>, std::shared_ptr
 const char* surface_kind(const Surface& surface);
 /// Bounds in the object frame (m). [any]
 Box surface_bounds(const Surface& surface);
+/// The provider of that kind, or nullptr. [any]
+template <class Provider>
+const Provider* provider_of(const Surface& surface) noexcept {
+  const auto* provider = std::get_if<std::shared_ptr<const Provider>>(&surface);
+  return provider != nullptr ? provider->get() : nullptr;
+}
+/// The implicit surface, or nullptr. [any]
+inline const ImplicitSurface* implicit_of(const Surface& surface) noexcept {
+  return provider_of<ImplicitSurface>(surface);
+}
+/// The isosurface, also the one of an implicit surface's potential, or nullptr. [any]
+inline const IsoSurface* iso_of(const Surface& surface) noexcept {
+  if (const ImplicitSurface* implicit = implicit_of(surface)) return &implicit->iso();
+  return provider_of<IsoSurface>(surface);
+}
+/// The parametric surface, or nullptr. [any]
+inline const ParametricSurface* parametric_of(const Surface& surface) noexcept {
+  return provider_of<ParametricSurface>(surface);
+}
+/// The surface that a program has added, or nullptr. [any]
+inline const CustomSurface* custom_of(const Surface& surface) noexcept {
+  return provider_of<CustomSurface>(surface);
+}
 /// The mesh that carries the surface, or that an implicit surface was made from; nullptr where there is none. [any]
 const MeshSurface* base_of(const Surface& surface) noexcept;
-/// The isosurface, also the one of an implicit surface's potential, or nullptr. [any]
-const IsoSurface* iso_of(const Surface& surface) noexcept;
-/// The implicit surface, or nullptr. [any]
-const ImplicitSurface* implicit_of(const Surface& surface) noexcept;
-/// The parametric surface, or nullptr. [any]
-const ParametricSurface* parametric_of(const Surface& surface) noexcept;
-/// The surface that a program has added, or nullptr. [any]
-const CustomSurface* custom_of(const Surface& surface) noexcept;
 /// The mesh of a surface that has one. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 
@@ -86,7 +101,9 @@ Material local_material(const Instance& instance, const Vec3& p, Hint& hint) noe
 /// Whether it may differ from place to place. [servo]
 bool has_local_material(const Instance& instance) noexcept;
 /// The relief of an instance that wears a coat, or nullptr. [servo]
-const ReliefSurface* relief_of(const Instance& instance) noexcept;
+inline const ReliefSurface* relief_of(const Instance& instance) noexcept {
+  return provider_of<ReliefSurface>(instance.surface);
+}
 
 /// What is true of a scene as a whole.
 struct SceneSettings {
@@ -117,17 +134,19 @@ class Scene {
   static Result<Scene> build(std::vector<Instance> instances, const SceneSettings& settings = {},
                              std::vector<FieldEffect> effects = {});
 
-  [[nodiscard]] std::span<const Instance> instances() const noexcept { return instances_; }
+  [[nodiscard]] std::span<const Instance> instances() const noexcept { return given_.empty() ? felt_ : given_; }
   [[nodiscard]] const SceneSettings& settings() const noexcept { return settings_; }
   /// The instances with their materials as a zoomed hand feels them: what a tick goes by. [servo]
-  [[nodiscard]] std::span<const Instance> felt() const noexcept {
-    return felt_.empty() ? std::span<const Instance>(instances_) : std::span<const Instance>(felt_);
-  }
-  [[nodiscard]] std::span<const FieldEffect> felt_effects() const noexcept {
-    return felt_effects_.empty() ? std::span<const FieldEffect>(effects_) : std::span<const FieldEffect>(felt_effects_);
-  }
+  [[nodiscard]] std::span<const Instance> felt() const noexcept { return felt_; }
+  [[nodiscard]] std::span<const FieldEffect> felt_effects() const noexcept { return felt_effects_; }
   /// What is felt everywhere in a volume, without a surface. [servo]
-  [[nodiscard]] std::span<const FieldEffect> effects() const noexcept { return effects_; }
+  [[nodiscard]] std::span<const FieldEffect> effects() const noexcept {
+    return given_effects_.empty() ? felt_effects_ : given_effects_;
+  }
+  /// Whether a tick may read a volume: for an isosurface or an effect. [servo]
+  [[nodiscard]] bool reads_volumes() const noexcept { return reads_volumes_; }
+  /// Whether an instance moves on by itself. [servo]
+  [[nodiscard]] bool moves() const noexcept { return moves_; }
   /// Radius of the probe's tip in the scene (m); 0 is a point. [servo]
   [[nodiscard]] double probe_radius() const noexcept { return settings_.probe_radius / settings_.view.zoom; }
   /// Tells snapshots apart, never 0. A state made for another one re-acquires its contacts. [servo]
@@ -140,13 +159,15 @@ class Scene {
  private:
   Scene() = default;
 
-  std::vector<Instance> instances_;
-  std::vector<FieldEffect> effects_;
-  std::vector<Box> bounds_;
-  std::vector<Instance> felt_;  ///< empty: as they are
+  std::vector<Instance> felt_;
   std::vector<FieldEffect> felt_effects_;
+  std::vector<Instance> given_;  ///< empty: they are felt as they are
+  std::vector<FieldEffect> given_effects_;
+  std::vector<Box> bounds_;
   SceneSettings settings_;
   std::uint64_t epoch_ = 0;
+  bool reads_volumes_ = false;
+  bool moves_ = false;
 };
 
 }  // namespace asperity

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "asperity/render/custom_law.h"
 #include "asperity/render/detail/change.h"
@@ -45,6 +46,7 @@ bool overlap(const Box& a, const Box& b) noexcept {
 
 /// How far a moving instance may carry a proxy within a tick (m).
 double farthest_carried(const Scene& scene, const Vec3& proxy, Seconds dt) noexcept {
+  if (!scene.moves()) return 0.0;
   double farthest = 0.0;
   for (const Instance& instance : scene.felt()) {
     const Motion& motion = instance.motion;
@@ -245,20 +247,22 @@ void add_attraction(const Instance& instance, const ProbeSample& probe, const Ve
 }
 
 /// What friction and texture add to a proxy's answer, which is in the world frame.
-void add_to_proxy(const Instance& instance, double share, const ProbeSample& probe, const FineMotion& motion,
+void add_to_proxy(const Instance& instance, double share, const ProbeSample& probe, const Vec3& previous, Seconds dt,
                   ContactState& slot, Tick& tick, EnergyTank& tank, ProxyAnswer::Part& part) noexcept {
   LawForce& law = part.law;
   const bool adds = adds_friction(instance);
-  const bool maps = relief_of(instance) != nullptr && has_local_material(instance);
-  const Vec3 touched = slot.pose.apply_inverse(law.point);
-  const Material local = maps ? local_material(instance, touched, slot.hint) : instance.material;
-  add_viscosity(local.viscosity, velocity_over(instance, slot, probe), law);
+  std::optional<Material> mapped;
+  if (relief_of(instance) != nullptr && has_local_material(instance))
+    mapped = local_material(instance, slot.pose.apply_inverse(law.point), slot.hint);
+  const Material& local = mapped ? *mapped : instance.material;
+  if (local.viscosity > 0.0) add_viscosity(local.viscosity, velocity_over(instance, slot, probe), law);
   if (!adds && instance.fine == nullptr) {
     if (has_moved(slot)) limit_drag(slot, law.point, tank, law);
     if (law.contact && instance.material.static_friction > 0.0 && proxy_holds_friction(instance))
       law.friction = law.force - law.force.dot(law.normal) * law.normal;
     return;
   }
+  const FineMotion motion = motion_over(instance, probe, previous, dt, slot);
   const double stiffness = share * part.stiffness;
   law.push = law.pulls ? 0.0 : stiffness * law.penetration;
   const Pose& pose = slot.pose;
@@ -315,6 +319,7 @@ class VolumeReading {
  private:
   template <class Visit>
   void for_each(Visit&& visit) const noexcept {
+    if (!scene_.reads_volumes()) return;
     for (const Instance& instance : scene_.felt()) {
       if (const IsoSurface* iso = iso_of(instance.surface)) visit(iso->field());
     }
@@ -326,6 +331,7 @@ class VolumeReading {
 /// The finest level at which all volumes are in memory around the probe; one for all of them, so that a replay can ask
 /// for it. Tells their streaming threads where the probe is and goes.
 int level_now(const Scene& scene, const ProxyState& state, const ProbeSample& probe, ForceSample& out) noexcept {
+  if (!scene.reads_volumes()) return 0;
   int level = 0;
   const auto ask = [&](const ScalarField& field, const Pose& pose) {
     if (field.bricks() == nullptr) return;
@@ -444,7 +450,7 @@ bool update_laws(const Scene& scene, int level, Seconds dt, ProxyState& state) n
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.felt()[slot.instance];
     slot.law = instance.law.index();
-    const IsoSurface* iso = iso_of(instance.surface);
+    const IsoSurface* iso = scene.reads_volumes() ? iso_of(instance.surface) : nullptr;
     if (iso == nullptr) continue;
     const Pose& pose = slot.pose;
     const int here = std::min(level, iso->field().levels() - 1);
@@ -462,15 +468,13 @@ void take_answer(const Scene& scene, const ProbeSample& probe, Seconds dt, Proxy
     const Instance& instance = scene.felt()[part.instance];
     for (ContactState& slot : state.contacts) {
       if (slot.instance == part.instance)
-        add_to_proxy(instance, answer.rendered_share, probe,
-                     motion_over(instance, probe, state.previous_probe, dt, slot), slot, tick, state.tank, part);
+        add_to_proxy(instance, answer.rendered_share, probe, state.previous_probe, dt, slot, tick, state.tank, part);
     }
     tick.add(part.instance, part.law);
     for (ContactState& slot : state.contacts) {
       if (slot.instance != part.instance) continue;
       slot.in_touch = part.law.contact;
-      remember_anchor(instance, slot.pose.apply_inverse(part.law.point), part.law.contact ? part.law.element : no_index,
-                      answer.proxy, slot);
+      remember_anchor(instance, part.law.point, part.law.contact ? part.law.element : no_index, answer.proxy, slot);
     }
   }
 }
@@ -478,9 +482,13 @@ void take_answer(const Scene& scene, const ProbeSample& probe, Seconds dt, Proxy
 bool finite(const ProbeSample& probe) noexcept {
   // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
   constexpr double farthest = 1e6;
-  return probe.pose.position.cwiseAbs().maxCoeff() < farthest && probe.pose.position.allFinite() &&
-         probe.pose.orientation.coeffs().allFinite() && probe.twist.linear.allFinite() &&
-         probe.twist.angular.allFinite() && std::isfinite(probe.time.count());
+  const Vec3& place = probe.pose.position;
+  if (!(std::abs(place.x()) < farthest && std::abs(place.y()) < farthest && std::abs(place.z()) < farthest))
+    return false;
+  // 0 times a number is 0; times an infinity or no number it is none.
+  return (0.0 * probe.pose.orientation.coeffs()).sum() + (0.0 * probe.twist.linear).sum() +
+             (0.0 * probe.twist.angular).sum() + 0.0 * probe.time.count() ==
+         0.0;
 }
 
 }  // namespace
@@ -561,7 +569,7 @@ ForceSample step(const Scene& scene, ProxyState& state, const ProbeSample& sampl
   state.force = tick.out.wrench.force;
   tick.out.flags.set(TickFlag::not_converged, !answer.converged);
   tick.out.flags.set(TickFlag::energy_limited, answer.energy_limited || tick.limited);
-  remember_places(scene, state, position);
+  remember_places(scene, state, position, changed);
   state.previous_probe = position;
   state.workspace_probe = sample.pose.position;
   if (!direct) to_hand(view, tick.out);

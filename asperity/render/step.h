@@ -40,6 +40,12 @@ struct TextureState {
 /// A place on a mesh that goes along with it.
 struct SurfaceAnchor {
   std::uint32_t face = no_index;
+  /// On triangles: u, v and height are asked for when the surface has changed, and follow from the next three (object
+  /// frame): the face's corners, the place and the proxy as they were.
+  bool raw = false;
+  std::array<Vec3, 3> corners = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+  Vec3 point = Vec3::Zero();
+  Vec3 proxy = Vec3::Zero();
   double u = 0.0;  ///< barycentric coordinates of the second and third corner
   double v = 0.0;
   double height = 0.0;  ///< of the proxy over the face (m)
@@ -76,6 +82,8 @@ struct ContactState {
   bool counted = false;       ///< `potential` is of the last tick
   bool in_touch = false;      ///< law that moves the proxy: it was held here at the last tick
   bool placed = false;        ///< `pose` is of the last tick
+  bool moved = false;         ///< the instance has changed under the probe since the last tick
+  bool noted = false;         ///< `lineage` and `side_known` are of this scene
   bool level_known = false;   ///< hint.moment's level is one that was felt
   bool moment_known = false;
   bool moment_changed = false;  ///< another state of the coat is felt than at the last tick

@@ -63,6 +63,10 @@ Vec3 unit_or_zero(const Vec3& v) noexcept {
 
 BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face) noexcept {
   const auto [a, b, c] = mesh.corners(face);
+  return barycentric_frame(a, b, c);
+}
+
+BarycentricFrame barycentric_frame(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
   const Vec3 cross = (b - a).cross(c - a);
   const double twice_area = cross.norm();
   BarycentricFrame frame;

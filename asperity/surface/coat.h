@@ -208,6 +208,7 @@ struct BarycentricFrame {
   /// Signed height of `p` over the plane (m). [servo]
   [[nodiscard]] double height(const Vec3& p) const noexcept { return normal.dot(p - corner); }
 };
+BarycentricFrame barycentric_frame(const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
 BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face) noexcept;
 
 }  // namespace asperity

@@ -76,6 +76,17 @@ void choose_moment(const Scene& scene, const Instance& instance, const ProbeSamp
   slot.hint.moment = moment;
 }
 
+/// Works out where an anchor on triangles is on its face.
+void settle(SurfaceAnchor& anchor) noexcept {
+  if (!anchor.raw) return;
+  anchor.raw = false;
+  const BarycentricFrame frame = barycentric_frame(anchor.corners[0], anchor.corners[1], anchor.corners[2]);
+  const Vec3 place = frame.coordinates(anchor.point);
+  anchor.u = place[1];
+  anchor.v = place[2];
+  anchor.height = frame.height(anchor.proxy);
+}
+
 /// The place of a relief that the proxy rested on, where it is now. False where it is not known.
 bool carry_on_relief(const Instance& instance, const ReliefSurface& relief, ContactState& slot, Vec3& proxy) noexcept {
   ReliefPlace& place = slot.hint.relief;
@@ -212,10 +223,6 @@ void adopt_view(const View& view, ProxyState& state, const ProbeSample& workspac
   state.view = view;
 }
 
-bool has_moved(const ContactState& slot) noexcept {
-  return slot.moment_changed || !same_pose(slot.pose, slot.pose_before);
-}
-
 Vec3 surface_motion(const ContactState& slot, const Vec3& p) noexcept {
   return p - slot.pose_before.apply(slot.pose.apply_inverse(p));
 }
@@ -229,17 +236,25 @@ bool follow_surfaces(const Scene& scene, ProxyState& state, const ProbeSample& p
   double strongest_stiffness = 0.0;
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.felt()[slot.instance];
-    const Pose now = instance.motion.at(instance.world_from_object, probe.time);
-    slot.pose_before = slot.placed ? slot.pose : now;
-    slot.pose = now;
-    slot.placed = true;
+    bool other_pose = false;
+    // What stood still at the last tick, and cannot move by itself, stands where it did.
+    if (new_scene || slot.moved || !slot.placed || instance.motion.moves()) {
+      const Pose now = instance.motion.at(instance.world_from_object, probe.time);
+      slot.pose_before = slot.placed ? slot.pose : now;
+      slot.pose = now;
+      slot.placed = true;
+      other_pose = !same_pose(slot.pose, slot.pose_before);
+    }
     choose_moment(scene, instance, probe, dt, state.proxy, slot);
-    any = any || has_moved(slot);
+    slot.moved = slot.moment_changed || other_pose;
+    any = any || slot.moved;
   }
+  if (!any && !new_scene) return false;
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.felt()[slot.instance];
     const bool moved = has_moved(slot);
     if (!constrains(instance.law) || (!moved && !new_scene)) continue;
+    settle(slot.anchor);
     bool carried = false;
     if (const ReliefSurface* relief = relief_of(instance);
         relief != nullptr && std::holds_alternative<ProxyLaw>(instance.law) && scene.probe_radius() == 0.0) {
@@ -300,26 +315,36 @@ double carried_share(const Vec3& force, const Vec3& surface_motion, EnergyTank& 
 
 void remember_anchor(const Instance& instance, const Vec3& point, std::uint32_t element, const Vec3& proxy,
                      ContactState& slot) noexcept {
-  slot.anchor.face = no_index;
+  SurfaceAnchor& anchor = slot.anchor;
+  anchor.face = no_index;
+  anchor.raw = false;
   if (const ReliefSurface* relief = relief_of(instance);
       relief != nullptr && std::holds_alternative<ProxyLaw>(instance.law) && slot.touching) {
     const ReliefPlace& place = slot.hint.relief;
-    slot.anchor = {place.frame.face, place.u, place.v, slot.side * relief->base().skin()};
+    anchor.face = place.frame.face;
+    anchor.u = place.u;
+    anchor.v = place.v;
+    anchor.height = slot.side * relief->base().skin();
     return;
   }
   const MeshSurface* mesh = anchored_mesh(instance);
   if (mesh == nullptr || element >= mesh->mesh().triangles().size()) return;
-  const BarycentricFrame frame = barycentric_frame(mesh->mesh(), element);
-  const Vec3 place = frame.coordinates(point);
-  slot.anchor = {element, place[1], place[2], frame.height(slot.pose.apply_inverse(proxy))};
+  anchor.face = element;
+  anchor.raw = true;
+  anchor.corners = mesh->mesh().corners(element);
+  const bool at_origin = slot.pose.is_identity();
+  anchor.point = at_origin ? point : slot.pose.apply_inverse(point);
+  anchor.proxy = at_origin ? proxy : slot.pose.apply_inverse(proxy);
 }
 
-void remember_places(const Scene& scene, ProxyState& state, const Vec3& probe) noexcept {
+void remember_places(const Scene& scene, ProxyState& state, const Vec3& probe, bool new_scene) noexcept {
   for (ContactState& slot : state.contacts) {
     const Instance& instance = scene.felt()[slot.instance];
-    slot.lineage = lineage_of(instance);
-    if (!constrains(instance.law)) continue;
-    slot.side_known = changes(instance);
+    if (new_scene || !slot.noted) {
+      slot.lineage = lineage_of(instance);
+      slot.side_known = constrains(instance.law) && changes(instance);
+      slot.noted = true;
+    }
     if (!slot.side_known) continue;
     Hint scratch;
     scratch.moment = slot.hint.moment;
@@ -331,6 +356,7 @@ void remember_places(const Scene& scene, ProxyState& state, const Vec3& probe) n
 
 Vec3 handed_over(const Scene& scene, ProxyState& state, const Vec3& force, const Vec3& probe, Seconds dt,
                  bool new_scene) noexcept {
+  if (!new_scene && state.residual.isZero(0.0)) return force;
   const double time = scene.settings().handover.count();
   // What the last tick's share of the old force has given since.
   state.tank.pay(state.residual.dot(probe - state.previous_probe));

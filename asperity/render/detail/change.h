@@ -19,7 +19,9 @@ bool follow_surfaces(const Scene& scene, ProxyState& state, const ProbeSample& p
                      bool new_scene) noexcept;
 
 /// Whether this instance has changed under the probe since the last tick. [servo]
-bool has_moved(const ContactState& slot) noexcept;
+inline bool has_moved(const ContactState& slot) noexcept {
+  return slot.moved;
+}
 /// What a law without a proxy may render of its force, 0 to 1, and what it holds then, after its instance has changed
 /// from holding slot.potential to `now` (J) with the probe where it was; pays from the tank. [servo]
 void pay_for_change(double now, ContactState& slot, EnergyTank& tank) noexcept;
@@ -29,12 +31,12 @@ double carried_share(const Vec3& force, const Vec3& surface_motion, EnergyTank& 
 /// Where in the world the surface's point under p (world) has come from within the last tick: p minus that. [servo]
 Vec3 surface_motion(const ContactState& slot, const Vec3& p) noexcept;
 
-/// Remembers the face under a contact (object frame) where the proxy (world) is held by triangles, so that it is found
-/// again when the mesh has been refitted. [servo]
+/// Remembers the face under a contact (world) where the proxy (world) is held by triangles, so that it is found again
+/// when the mesh has been refitted. [servo]
 void remember_anchor(const Instance& instance, const Vec3& point, std::uint32_t element, const Vec3& proxy,
                      ContactState& slot) noexcept;
 /// Remembers on which side of a changing surface the probe is. [servo]
-void remember_places(const Scene& scene, ProxyState& state, const Vec3& probe) noexcept;
+void remember_places(const Scene& scene, ProxyState& state, const Vec3& probe, bool new_scene) noexcept;
 
 /// Spreads the change of the force over the scene's hand-over time, as far as the tank pays. [servo]
 Vec3 handed_over(const Scene& scene, ProxyState& state, const Vec3& force, const Vec3& probe, Seconds dt,

@@ -11,6 +11,11 @@ namespace {
 // Two planes count as independent above this squared sine of the angle between them.
 constexpr double least_determinant = 1e-12;
 
+/// Rounding of products of coordinates that add up to `size` (m), with room.
+double rounding_of(double size) noexcept {
+  return 1e-14 * size + 1e-300;
+}
+
 class ActiveSet {
  public:
   ActiveSet(const Vec3& goal, const PlaneSet& planes, bool with_skin) noexcept : goal_(goal), planes_(planes) {
@@ -20,8 +25,7 @@ class ActiveSet {
       violation_[i] = offset - planes[i].normal.dot(goal);
       size += std::abs(violation_[i]);
     }
-    // Rounding of the products above, with room.
-    tolerance_ = 1e-14 * size + 1e-300;
+    tolerance_ = rounding_of(size);
   }
 
   PlaneProjection solve() noexcept {
@@ -110,9 +114,27 @@ class ActiveSet {
   PlaneProjection best_;
 };
 
+/// The same choices where there is one plane.
+PlaneProjection project_onto_one(const Vec3& goal, const ConstraintPlane& plane, bool with_skin) noexcept {
+  PlaneProjection best;
+  const double violation = plane.offset + (with_skin ? plane.skin : 0.0) - plane.normal.dot(goal);
+  best.point = goal;
+  best.feasible = violation <= 0.0;
+  if (best.feasible) return best;
+  const Vec3 moved = Vec3::Zero() + violation * plane.normal;
+  const double worst = std::max(0.0, violation - plane.normal.dot(moved));
+  const bool feasible = worst <= rounding_of(goal.norm() + std::abs(violation));
+  if (!feasible && worst >= violation) return best;
+  best.feasible = feasible;
+  best.point = goal + moved;
+  best.active.push_back({0, violation});
+  return best;
+}
+
 }  // namespace
 
 PlaneProjection project_onto_planes(const Vec3& goal, const PlaneSet& planes, bool with_skin) noexcept {
+  if (planes.size() == 1) return project_onto_one(goal, planes[0], with_skin);
   return ActiveSet(goal, planes, with_skin).solve();
 }
 

@@ -1,12 +1,14 @@
 #include "asperity/render/detail/proxy_tick.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "asperity/render/detail/god_object.h"
 #include "asperity/render/detail/iso_proxy.h"
 #include "asperity/render/detail/joint_proxy.h"
 #include "asperity/render/detail/parametric_proxy.h"
 #include "asperity/render/detail/proxy.h"
+#include "asperity/render/fine_contact.h"
 
 namespace asperity {
 
@@ -42,6 +44,7 @@ const CustomSurface* proxied_custom(const Instance& instance) noexcept {
 
 /// Whether the proxy's law goes by a smooth surface rather than by triangles.
 bool smooth(const Instance& instance) noexcept {
+  if (provider_of<MeshSurface>(instance.surface) != nullptr) return false;
   return proxied_relief(instance) != nullptr || proxied_parametric(instance) != nullptr ||
          proxied_iso(instance) != nullptr || proxied_custom(instance) != nullptr;
 }
@@ -232,6 +235,20 @@ ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool
   return solution;
 }
 
+/// What an instance is made of at a place (world): `room` holds it where that may differ from place to place.
+const Material& material_there(const Instance& instance, const Vec3& place, ContactState& slot,
+                               std::optional<Material>& room) noexcept {
+  if (!has_local_material(instance)) return instance.material;
+  return room.emplace(local_material(instance, slot.pose.apply_inverse(place), slot.hint));
+}
+
+/// Whether friction may hold the proxy on an instance.
+bool may_rub(const Instance& instance) noexcept {
+  const Material& material = instance.material;
+  return (has_local_material(instance) || material.static_friction > 0.0 || material.dynamic_friction > 0.0) &&
+         proxy_holds_friction(instance);
+}
+
 /// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
 void limit_energy(ProxyState& state, const Vec3& before, const Vec3& probe, ProxyAnswer& answer) noexcept {
   double stiffness = 0.0;
@@ -305,8 +322,8 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
     answer.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
     for (std::size_t i = 0; i < solver.size(); ++i) {
       const Instance& instance = solver.instance(i);
-      const Material material =
-          local_material(instance, solver.state(i).pose.apply_inverse(solution.proxy), solver.state(i).hint);
+      std::optional<Material> room;
+      const Material& material = material_there(instance, solution.proxy, solver.state(i), room);
       LawForce law = owner_force(instance, material, solver.state(i).pose, i, solution, goal, probe);
       if (std::holds_alternative<ForceShadingLaw>(instance.law))
         add_turn(solver.state(i), law, position - state.previous_probe);
@@ -315,13 +332,23 @@ ProxyAnswer solve_proxies(const Scene& scene, ProxyState& state, const ProbeSamp
   };
   const auto friction_in = [&](auto& solver, std::uint32_t owner) {
     const Instance& instance = solver.instance(owner);
-    const Vec3 place = solver.state(owner).pose.apply_inverse(before);
-    return friction_of(instance, local_material(instance, place, solver.state(owner).hint));
+    std::optional<Material> room;
+    return friction_of(instance, material_there(instance, before, solver.state(owner), room));
   };
   if (smooth_slot == nullptr) {
     MeshConstraints constraints(scene.probe_radius());
+    bool rubs = false;
     for (ContactState& slot : state.contacts) {
-      if (constrains(scene.felt()[slot.instance].law)) constraints.add(scene.felt()[slot.instance], slot);
+      const Instance& instance = scene.felt()[slot.instance];
+      if (!constrains(instance.law)) continue;
+      constraints.add(instance, slot);
+      rubs = rubs || may_rub(instance);
+    }
+    if (!rubs) {
+      state.sliding = false;
+      gather(constraints, solve_constraints(constraints, before, position), position);
+      limit_energy(state, held, position, answer);
+      return answer;
     }
     Vec3 goal;
     const ConstraintSolution solution = solve_with_friction(
