@@ -19,7 +19,7 @@ double seconds_since(Clock::time_point start) {
 }
 
 /// How a row touches the mesh.
-struct Touch {
+struct MeshTouch {
   double radius = 0.0;    ///< m
   bool friction = false;  ///< 0.3 / 0.2
   bool resting = false;   ///< where the slide begins, and stays there
@@ -27,7 +27,7 @@ struct Touch {
 
 /// A row that takes a probe through `step`.
 Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSurface>& surface,
-                     const std::shared_ptr<const Slide>& slide, const Touch& touch) {
+                     const std::shared_ptr<const Slide>& slide, const MeshTouch& touch) {
   Instance sphere;
   sphere.name = "sphere";
   sphere.surface = surface;
@@ -105,7 +105,7 @@ Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_
   const auto slide = std::make_shared<const Slide>(make_slide(surface->index(), effort.ticks()));
   group.largest_disagreement = largest_disagreement(*surface, *peer, *slide);
   std::vector<Row> rows;
-  const auto add = [&](const char* name, const Touch& touch) -> Status {
+  const auto add = [&](const char* name, const MeshTouch& touch) -> Status {
     ASPERITY_TRY(Row row, step_row(name, surface, slide, touch));
     rows.push_back(std::move(row));
     return success();

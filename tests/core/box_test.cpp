@@ -6,7 +6,7 @@
 #include "asperity/core/frames.h"
 #include "asperity/core/rng.h"
 
-namespace asperity {
+namespace asperity::box_test {
 namespace {
 
 Pose random_pose(Rng& rng) {
@@ -78,4 +78,4 @@ TEST(Box, EmptyStaysEmpty) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::box_test

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-namespace asperity {
+namespace asperity::identity_test {
 namespace {
 
 TEST(Identity, IsNeverGivenTwiceAndNeverZero) {
@@ -24,4 +24,4 @@ TEST(Identity, IsNeverGivenTwiceAndNeverZero) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::identity_test

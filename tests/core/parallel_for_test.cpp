@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace asperity {
+namespace asperity::parallel_for_test {
 namespace {
 
 TEST(ParallelFor, VisitsEveryItemOnceForAnyCountGrainAndNumberOfThreads) {
@@ -170,4 +170,4 @@ TEST(ParallelFor, WhatProgressThrowsGoesToTheCaller) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::parallel_for_test

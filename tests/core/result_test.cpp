@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-namespace asperity {
+namespace asperity::result_test {
 namespace {
 
 Result<std::string> failed() {
@@ -62,4 +62,4 @@ TEST(ResultDeathTest, TheErrorOfASuccessEndsWithWords) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::result_test

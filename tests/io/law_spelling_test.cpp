@@ -4,7 +4,7 @@
 
 #include "asperity/io/detail/scene_reader.h"
 
-namespace asperity {
+namespace asperity::law_spelling_test {
 namespace {
 
 /// The law of a scene file with every option written out.
@@ -53,4 +53,4 @@ TEST(LawSpelling, AFormThatALawDoesNotHaveIsRefused) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::law_spelling_test

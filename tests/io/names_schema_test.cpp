@@ -14,7 +14,7 @@
 #include "asperity/io/volume_io.h"
 #include "asperity/surface/implicit_texture.h"
 
-namespace asperity {
+namespace asperity::names_schema_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -135,4 +135,4 @@ TEST(SchemaNames, AreThoseOfTheTables) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::names_schema_test

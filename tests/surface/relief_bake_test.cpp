@@ -10,7 +10,7 @@
 
 #include "tests/surface/coats.h"
 
-namespace asperity {
+namespace asperity::relief_bake_test {
 namespace {
 
 using namespace test;
@@ -227,4 +227,4 @@ TEST(ReliefBake, an_atlas_of_another_mesh_is_refused) {
 }
 
 }  // namespace
-}  // namespace asperity
+}  // namespace asperity::relief_bake_test

@@ -11,7 +11,7 @@
 namespace asperity::vtk_io {
 namespace {
 
-constexpr std::uint64_t most_along_axis = 1U << 24U;
+constexpr std::uint64_t most_nrrd_samples_along_axis = 1U << 24U;
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
@@ -145,9 +145,10 @@ class NrrdFile {
   Status sizes(std::string_view value) {
     for (std::string_view word = mesh_readers::take_word(value); !word.empty(); word = mesh_readers::take_word(value)) {
       std::int64_t n = 0;
-      if (!mesh_readers::parse_integer(word, n) || n < 1 || static_cast<std::uint64_t>(n) > most_along_axis) {
+      if (!mesh_readers::parse_integer(word, n) || n < 1 ||
+          static_cast<std::uint64_t>(n) > most_nrrd_samples_along_axis) {
         return bad(fmt::format("sizes has \"{}\"", word.substr(0, 40)),
-                   fmt::format("whole numbers, 1 to {}", most_along_axis), ErrorCode::bad_value);
+                   fmt::format("whole numbers, 1 to {}", most_nrrd_samples_along_axis), ErrorCode::bad_value);
       }
       if (sizes_.size() == 16) return bad("has more than 16 sizes", "three or four sizes", ErrorCode::bad_value);
       sizes_.push_back(static_cast<std::uint64_t>(n));
