@@ -9,7 +9,7 @@
 #include "asperity/core/result.h"
 #include "asperity/core/samples.h"
 
-namespace asperity::names_test {
+namespace asperity {
 
 /// Not in the order of its values, and without a name for one of them.
 enum class Fruit : std::uint8_t { apple, pear, plum, quince };
@@ -72,4 +72,4 @@ TEST(Names, EveryCauseHasOne) {
 }
 
 }  // namespace
-}  // namespace asperity::names_test
+}  // namespace asperity
