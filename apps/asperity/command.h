@@ -2,7 +2,9 @@
 // What the commands of the program share. Each command has one file: add_NAME declares its options and says what to do.
 
 #include <functional>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 
 #include "apps/asperity/arguments.h"
@@ -49,6 +51,12 @@ void add_library(Arguments& program, Console& console, Action& action);
 void add_scenes(Arguments& program, Console& console, Action& action);
 void add_bench(Arguments& program, Console& console, Action& action);
 void add_schema(Arguments& program, Console& console, Action& action);
+
+/// Declares a command: its options, and what it does with them.
+using AddCommand = void (*)(Arguments& program, Console& console, Action& action);
+
+/// Runs the command line with these commands, and answers the exit code; see run_program. [main]
+int run_commands(int argc, char** argv, std::span<const AddCommand> commands, std::initializer_list<Status> prepared);
 
 /// Adds --json and --progress, which every command takes.
 void add_console_options(Arguments& command, Console& console, bool with_json = true);

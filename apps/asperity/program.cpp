@@ -1,97 +1,17 @@
-// The asperity program: commands, exit codes, one message for each error.
-
 #include "apps/asperity/program.h"
 
-#include <fmt/format.h>
-
-#include <cstdio>
-#include <exception>
-#include <filesystem>
-#include <iostream>
+#include <array>
 
 #include "apps/asperity/command.h"
 
 namespace asperity {
-namespace {
-
-using namespace program;
-
-constexpr const char* examples =
-    "Examples:\n"
-    "  asperity touch                                   touch the built-in scene, write a report\n"
-    "  asperity touch bunny.obj                         touch a mesh as it is\n"
-    "  asperity touch bunny.obj --relief rock.png --height 2mm\n"
-    "  asperity compare M_a-H_3 --laws proxy,mesostructure\n"
-    "  asperity inspect rock.png --device touch         what it is, and what can be felt of it\n"
-    "  asperity replay out/icosphere-relief/trace.asptrace\n"
-    "  asperity COMMAND --help                          teaches one command\n"
-    "\n"
-    "Exit codes: 0 success, 1 it ran but what it checked does not hold, 2 bad input or usage.";
-
-/// What it was called as: a program that is asperity with something of its own has its own name.
-std::string called_as(int argc, char** argv) {
-  const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : std::string();
-  return name.empty() ? "asperity" : name;
-}
-
-std::string whole_command_line(int argc, char** argv) {
-  std::string line = called_as(argc, argv);
-  for (int i = 1; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const bool plain = !argument.empty() && argument.find_first_of(" \"'\\$&|;<>()*?`\n\t") == std::string::npos;
-    line += plain ? " " + argument : " '" + argument + "'";
-  }
-  return line;
-}
-
-int fail(const std::string& message) {
-  std::cout.flush();
-  std::cerr << "asperity: " << message << '\n';
-  return exit_bad_input;
-}
-
-int run(int argc, char** argv) {
-  Console console;
-  Action action;
-  console.command_line = whole_command_line(argc, argv);
-  CommandLine line(called_as(argc, argv),
-                   "Asperity renders fine surface detail to the hand: it slides a probe over a surface and answers the "
-                   "force at every tick.",
-                   program_name());
-  Arguments program = line.arguments();
-  program.closing_words(examples);
-  add_touch(program, console, action);
-  add_compare(program, console, action);
-  add_replay(program, console, action);
-  add_inspect(program, console, action);
-  add_convert(program, console, action);
-  add_fit_friction(program, console, action);
-  add_score(program, console, action);
-  add_library(program, console, action);
-  add_scenes(program, console, action);
-  add_bench(program, console, action);
-  add_schema(program, console, action);
-  std::string problem;
-  if (const std::optional<int> code = line.parse(argc, argv, problem)) {
-    return problem.empty() ? *code : fail(problem + "; asperity --help shows what is accepted");
-  }
-  const Result<int> code = action();
-  if (!code) return fail(code.error().message());
-  std::cout.flush();
-  return std::cout ? *code : fail("standard output cannot be written");
-}
-
-}  // namespace
 
 int run_program(int argc, char** argv, std::initializer_list<Status> prepared) {
-  try {
-    for (const Status& status : prepared) {
-      if (!status) return fail(status.error().message());
-    }
-    return run(argc, argv);
-  } catch (const std::exception& problem) {
-    return fail(problem.what());
-  }
+  using namespace program;
+  static constexpr std::array<AddCommand, 11> commands{add_touch,   add_compare,      add_replay, add_inspect,
+                                                       add_convert, add_fit_friction, add_score,  add_library,
+                                                       add_scenes,  add_bench,        add_schema};
+  return run_commands(argc, argv, commands, prepared);
 }
 
 }  // namespace asperity

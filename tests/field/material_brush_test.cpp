@@ -25,7 +25,7 @@ const PointMaterial& own() {
 /// A ball of 16 mm.
 const SparseGrid& ball() {
   static const auto grid = test::sparse_grid([](const Vec3& p) { return test::ball_distance(p, 0.016); },
-                                                test::cube(0.016), voxel, 3.0 * voxel, 3.0 * voxel);
+                                             test::cube(0.016), voxel, 3.0 * voxel, 3.0 * voxel);
   return *grid;
 }
 

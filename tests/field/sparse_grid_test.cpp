@@ -89,7 +89,7 @@ TEST(SparseGrid, BeyondTheBandLiesASideOfItsOwn) {
   EXPECT_FLOAT_EQ(static_cast<float>(grid->trilinear(Vec3(std::nan(""), 0, 0), hint).value), 0.004F);
   // A cavity: outside again, though it cannot be reached from outside.
   const auto hollow = test::sparse_grid([](const Vec3& p) { return std::abs(p.norm() - 0.04) - 0.01; },
-                                           test::cube(0.05), voxel, 0.004, 0.004);
+                                        test::cube(0.05), voxel, 0.004, 0.004);
   EXPECT_FLOAT_EQ(static_cast<float>(hollow->trilinear(Vec3::Zero(), hint).value), 0.004F);
   EXPECT_FLOAT_EQ(static_cast<float>(hollow->trilinear(Vec3(0.04, 0, 0), hint).value), -0.004F);
 }
@@ -210,8 +210,7 @@ TEST(SparseGrid, TheNearestPointTellsTheFace) {
 }
 
 TEST(SparseGrid, MaterialsAreInterpolatedAcrossBricks) {
-  SparseSource source =
-      test::sparse_source([](const Vec3& p) { return p.z(); }, test::cube(0.02), voxel, 0.02, 0.02);
+  SparseSource source = test::sparse_source([](const Vec3& p) { return p.z(); }, test::cube(0.02), voxel, 0.02, 0.02);
   const auto stiffness = [](const Vec3& p) { return 500.0 + 1e4 * p.x() + 2e4 * p.y() * p.y(); };
   for (SparseBlock& block : source.blocks) {
     if (block.at[0] < 0) continue;  // there the surface's own

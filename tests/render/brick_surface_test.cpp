@@ -16,7 +16,7 @@ using BrickSurface = BrickFiles;
 
 ScalarGrid wavy_sphere(std::uint32_t count) {
   return test::sampled(test::cube_axes(0.05, count),
-                          [](const Vec3& p) { return p.norm() + 0.0003 * std::sin(p.x() / 0.002); });
+                       [](const Vec3& p) { return p.norm() + 0.0003 * std::sin(p.x() / 0.002); });
 }
 
 Scene scene_on(std::shared_ptr<const ScalarField> field) {

@@ -130,8 +130,8 @@ TEST(ContactFriction, The_default_is_the_proxys_own_and_equals_the_law_on_top) {
 
 TEST(ContactFriction, Felt_under_every_contact_law) {
   ImplicitParts parts;
-  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); },
-                                    Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)}, 1e-3, 6e-3, 6e-3);
+  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); }, Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)},
+                                 1e-3, 6e-3, 6e-3);
   const auto potential = std::make_shared<const ImplicitSurface>(must(ImplicitSurface::build(parts)));
   const auto volume =
       volumes::surface_of(volumes::sampled(volumes::cube(0.03, 31), [](const Vec3& p) { return p.z(); }), 0.0);

@@ -32,7 +32,7 @@ std::shared_ptr<const SparseGrid> edge() {
   box.lower = Vec3(0.008, -0.004, 0.008);
   box.upper = Vec3(half, 0.01, half);
   return asperity::test::sparse_grid([](const Vec3& p) { return box_distance(p, Vec3::Constant(half)); }, box, voxel,
-                                        4.0 * voxel, 4.0 * voxel);
+                                     4.0 * voxel, 4.0 * voxel);
 }
 
 std::shared_ptr<const ImplicitSurface> textured_edge(const PointHeight& height, Redistancing mode) {

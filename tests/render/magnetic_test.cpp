@@ -184,9 +184,8 @@ TEST(Magnetic, DampingTakesEnergyOnBothSidesAndFadesWithTheBand) {
 }
 
 TEST(Magnetic, ChangesOfStiffnessGiveNoMoreThanTheyTook) {
-  SparseSource source =
-      test::sparse_source([](const Vec3& p) { return test::box_distance(p, Vec3::Constant(half)); },
-                             test::cube(half), voxel, 6e-3, 6e-3);
+  SparseSource source = test::sparse_source([](const Vec3& p) { return test::box_distance(p, Vec3::Constant(half)); },
+                                            test::cube(half), voxel, 6e-3, 6e-3);
   for (SparseBlock& block : source.blocks) {
     block.material.resize(SparseBlock::points);
     for (int n = 0; n < static_cast<int>(SparseBlock::points); ++n) {

@@ -281,8 +281,8 @@ TEST(Texture, The_same_on_every_provider) {
   const auto volume =
       volumes::surface_of(volumes::sampled(volumes::cube(0.03, 31), [](const Vec3& p) { return p.z(); }), 0.0);
   ImplicitParts parts;
-  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); },
-                                    Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)}, 1e-3, 6e-3, 6e-3);
+  parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); }, Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)},
+                                 1e-3, 6e-3, 6e-3);
   const auto potential = std::make_shared<const ImplicitSurface>(must(ImplicitSurface::build(parts)));
   ParametricSettings formula;
   formula.shape = ParametricShape::plane;

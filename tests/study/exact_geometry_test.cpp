@@ -20,9 +20,9 @@ std::shared_ptr<const MeshSurface> box() {
 
 Scene potential_scene(const std::shared_ptr<const MeshSurface>& mesh, double offset = 0.0) {
   return scene_of(
-      std::make_shared<const ImplicitSurface>(ImplicitSurface::build({test::sparse_box(0.0005, 0.003), nullptr, mesh,
-                                                                      CellReconstruction::smooth, offset})
-                                                  .value()),
+      std::make_shared<const ImplicitSurface>(
+          ImplicitSurface::build({test::sparse_box(0.0005, 0.003), nullptr, mesh, CellReconstruction::smooth, offset})
+              .value()),
       ProxyLaw{});
 }
 

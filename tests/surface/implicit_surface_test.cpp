@@ -46,8 +46,7 @@ TEST(ImplicitSurface, TheFirstTouchOfAMotionIsExact) {
   Hint hint;
   int hits = 0;
   for (int n = 0; n < 2000; ++n) {
-    const Segment motion{0.05 * test::random_point(generator, 1.0).normalized(),
-                         test::random_point(generator, 0.05)};
+    const Segment motion{0.05 * test::random_point(generator, 1.0).normalized(), test::random_point(generator, 0.05)};
     const Vec3 d = motion.to - motion.from;
     const double b = motion.from.dot(d);
     const double c = motion.from.squaredNorm() - 0.03 * 0.03;

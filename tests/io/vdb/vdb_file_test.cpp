@@ -63,7 +63,7 @@ class VdbFile : public WithVdb {
 /// A ball with faces that count the points, and materials on one side.
 SparseSource painted_ball() {
   SparseSource source = test::sparse_source([](const Vec3& p) { return test::ball_distance(p, 0.05); },
-                                               {Vec3::Constant(-0.06), Vec3::Constant(0.06)}, 0.003, 0.009, 0.012);
+                                            {Vec3::Constant(-0.06), Vec3::Constant(0.06)}, 0.003, 0.009, 0.012);
   source.origin = Vec3(0.1, -0.25, 0.003);
   std::uint32_t number = 0;
   for (SparseBlock& block : source.blocks) {
@@ -363,7 +363,7 @@ TEST_F(VdbFile, ChangedBytesDoNoHarm) {
 
 TEST_F(VdbFile, VoxelsOfMicrometresAreKept) {
   SparseSource source = test::sparse_source([](const Vec3& p) { return test::ball_distance(p, 2e-5); },
-                                               {Vec3::Constant(-2.1e-5), Vec3::Constant(2.1e-5)}, 1e-6, 3e-6, 3e-6);
+                                            {Vec3::Constant(-2.1e-5), Vec3::Constant(2.1e-5)}, 1e-6, 3e-6, 3e-6);
   source.origin = Vec3(1e-5, 0.1, -3.0);
   const auto grid = SparseGrid::build(std::move(source));
   ASSERT_TRUE(grid) << grid.error().message();
