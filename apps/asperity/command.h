@@ -15,6 +15,9 @@ namespace asperity::program {
 
 using Json = nlohmann::ordered_json;
 
+/// The number; null where it is not finite (a radius without end, an angle of nothing).
+Json finite_or_null(double value);
+
 /// Exit codes: the same for every command.
 inline constexpr int exit_success = 0;
 inline constexpr int exit_check_failed = 1;  ///< it ran, and what it checked does not hold

@@ -10,12 +10,6 @@
 namespace asperity::program {
 namespace {
 
-/// Force with which the stroke presses on the plain surface (N).
-double stroke_force(const Experiment& experiment, double stiffness) {
-  const StrokeSettings& stroke = experiment.stroke;
-  return stroke.press == PressMode::force ? stroke.normal_force : stiffness * std::max(0.0, stroke.depth);
-}
-
 void amplitude_line(const Coat& coat, const Experiment& experiment, double stiffness, std::vector<std::string>& lines) {
   const double range = coat.highest() - coat.lowest();
   const double force = range * stiffness;
@@ -80,6 +74,11 @@ void potential_lines(const ImplicitSurface& surface, const Instance& instance, d
 }
 
 }  // namespace
+
+double stroke_force(const Experiment& experiment, double stiffness) {
+  const StrokeSettings& stroke = experiment.stroke;
+  return stroke.press == PressMode::force ? stroke.normal_force : stiffness * std::max(0.0, stroke.depth);
+}
 
 std::vector<std::string> feel_of(const Experiment& experiment, const Instance& instance) {
   std::vector<std::string> lines;

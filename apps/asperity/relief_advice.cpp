@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "apps/asperity/feel.h"
+
 namespace asperity::program {
 namespace {
 
@@ -40,8 +42,7 @@ std::string base_line(const BaseMeshAdvice& base) {
 
 double pressing_force(const Experiment& experiment, double stiffness) {
   constexpr double usual = 1.0;  // N
-  const StrokeSettings& stroke = experiment.stroke;
-  const double force = stroke.press == PressMode::force ? stroke.normal_force : stiffness * std::max(0.0, stroke.depth);
+  const double force = stroke_force(experiment, stiffness);
   return force > 0.0 ? force : usual;
 }
 
@@ -63,11 +64,6 @@ Json base_json(const BaseMeshAdvice& base) {
           {"edge_needed_m", base.edge_needed},
           {"triangles", base.triangles},
           {"left_to_the_coat_m", base.residual}};
-}
-
-/// Infinite radii are null.
-Json finite(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
 }  // namespace
@@ -178,15 +174,15 @@ Json advice_json(const ReliefAdvice& advice) {
               {"highest_m", shape.highest},
               {"wave_m", shape.wave},
               {"finest_wave_m", shape.finest_wave},
-              {"crest_radius_smallest_m", finite(shape.crests.smallest())},
-              {"crest_radius_sharpest_percent_m", finite(shape.crests.sharpest_percent())},
-              {"crest_radius_median_m", finite(shape.crests.median())},
+              {"crest_radius_smallest_m", finite_or_null(shape.crests.smallest())},
+              {"crest_radius_sharpest_percent_m", finite_or_null(shape.crests.sharpest_percent())},
+              {"crest_radius_median_m", finite_or_null(shape.crests.median())},
               {"map_step_m", shape.step}}},
             {"renderable", advice.answer.renderable}};
   for (const RenderFinding& found : advice.answer.findings) {
     json["criteria"].push_back({{"name", criterion_name(found.criterion)},
-                                {"value", finite(found.value)},
-                                {"limit", finite(found.limit)},
+                                {"value", finite_or_null(found.value)},
+                                {"limit", finite_or_null(found.limit)},
                                 {"passes", found.passes},
                                 {"text", found.text}});
   }

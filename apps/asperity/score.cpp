@@ -104,10 +104,6 @@ Result<MeasuredPath> read_path(const ScoreOptions& options) {
   return path;
 }
 
-Json finite_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 Json score_json(const PathScore& score, const MeasuredPath& path) {
   const ForceErrors& e = score.force;
   return {

@@ -23,6 +23,10 @@ Error Error::at(const std::string& prefix) && {
   return std::move(*this);
 }
 
+Error bad_value(std::string what, std::string place, std::string accepted) {
+  return {ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
+}
+
 void detail::wrong_side_of_result(const Error* error) noexcept {
   if (error != nullptr) {
     std::fprintf(stderr, "asperity: the value of a failed result was asked for: %s (%s)\n", error->message().c_str(),

@@ -9,8 +9,6 @@
 
 #include "asperity/core/names.h"
 
-#include "asperity/core/names.h"
-
 namespace asperity {
 
 /// Named cause of a failure.
@@ -67,6 +65,9 @@ struct Error {
   /// The same error with `prefix` put before its place.
   [[nodiscard]] Error at(const std::string& prefix) &&;
 };
+
+/// The Error of a value that is out of range: "is -1 m", where, and what would be accepted. [any]
+Error bad_value(std::string what, std::string place, std::string accepted);
 
 namespace detail {
 /// Says on standard error what was asked for in vain, and aborts: `error` is what is there in place of the value,

@@ -15,18 +15,14 @@ namespace asperity {
 namespace {
 
 constexpr std::size_t max_samples = 2'000'000;
-Error bad_value(std::string place, std::string what, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Status require_of_stroke(bool good, double value, const char* place, const char* accepted) {
   if (good && std::isfinite(value)) return success();
-  return bad_value(place, fmt::format("is {}", value), accepted);
+  return bad_value(fmt::format("is {}", value), place, accepted);
 }
 
 Status require_finite(const Vec3& value, const std::string& place) {
   if (value.allFinite()) return success();
-  return bad_value(place, "is not finite", "three finite coordinates (m)");
+  return bad_value("is not finite", place, "three finite coordinates (m)");
 }
 
 Status validate_motion(const StrokeSettings& s) {
@@ -40,7 +36,7 @@ Status validate_motion(const StrokeSettings& s) {
   } else {
     ASPERITY_CHECK(require_of_stroke(true, s.depth, "depth", "a finite length (m)"));
   }
-  if (s.repeats < 1) return bad_value("repeats", fmt::format("is {}", s.repeats), "1 or more");
+  if (s.repeats < 1) return bad_value(fmt::format("is {}", s.repeats), "repeats", "1 or more");
   return success();
 }
 
@@ -73,7 +69,7 @@ struct Plane {
 
 Result<Plane> plane_across(const Vec3& axis) {
   if (!axis.allFinite() || axis.norm() < 1e-300)
-    return bad_value("axis", "has no direction", "a vector that is not zero");
+    return bad_value("has no direction", "axis", "a vector that is not zero");
   const Vec3 n = axis.normalized();
   const Vec3 seed = std::abs(n.x()) < 0.9 ? Vec3(Vec3::UnitX()) : Vec3(Vec3::UnitZ());
   const Vec3 u = (seed - n * n.dot(seed)).normalized();
@@ -97,7 +93,7 @@ Result<std::size_t> round_vertices(const StrokeSettings& s, double length, doubl
   const double wanted = s.sample_spacing ? length / *s.sample_spacing : 2000.0;
   const double count = std::ceil(std::max(wanted, 256.0 * turns));
   if (count > static_cast<double>(max_samples)) {
-    return bad_value("sample_spacing", fmt::format("gives {:.0f} samples", count), "2 million samples at most");
+    return bad_value(fmt::format("gives {:.0f} samples", count), "sample_spacing", "2 million samples at most");
   }
   return static_cast<std::size_t>(count);
 }
@@ -122,7 +118,7 @@ Result<Guide> spiral_guide(const StrokeSettings& s) {
   ASPERITY_CHECK(validate_round(s));
   ASPERITY_TRY(const Plane plane, plane_across(s.axis));
   const double turns = s.pitch > 0.0 ? s.radius / s.pitch : s.turns;
-  if (turns > 1e4) return bad_value("pitch", fmt::format("gives {:.0f} windings", turns), "10000 windings at most");
+  if (turns > 1e4) return bad_value(fmt::format("gives {:.0f} windings", turns), "pitch", "10000 windings at most");
   ASPERITY_TRY(const std::size_t count, round_vertices(s, std::numbers::pi * turns * s.radius, turns));
   Guide guide;
   for (std::size_t i = 0; i <= count; ++i) {
@@ -144,7 +140,7 @@ Result<Guide> raster_guide(const StrokeSettings& s) {
   const double lift = diagonal.dot(plane.axis);
   const double wanted = s.pitch > 0.0 ? std::floor(std::abs(across) / s.pitch * (1.0 + 1e-12)) + 1.0 : s.rows;
   if (!(wanted >= 1.0 && wanted <= 1e5)) {
-    return bad_value(s.pitch > 0.0 ? "pitch" : "rows", fmt::format("gives {:.0f} rows", wanted), "1 to 100000 rows");
+    return bad_value(fmt::format("gives {:.0f} rows", wanted), s.pitch > 0.0 ? "pitch" : "rows", "1 to 100000 rows");
   }
   const int rows = static_cast<int>(wanted);
   const double last = s.pitch > 0.0 ? s.pitch * (rows - 1) / std::max(std::abs(across), 1e-300) : 1.0;
@@ -160,7 +156,7 @@ Result<Guide> raster_guide(const StrokeSettings& s) {
 }
 
 Result<Guide> polyline_guide(const StrokeSettings& s) {
-  if (s.points.size() < 2) return bad_value("points", fmt::format("has {}", s.points.size()), "two points or more");
+  if (s.points.size() < 2) return bad_value(fmt::format("has {}", s.points.size()), "points", "two points or more");
   for (std::size_t i = 0; i < s.points.size(); ++i) {
     ASPERITY_CHECK(require_finite(s.points[i], fmt::format("points[{}]", i)));
   }
@@ -184,7 +180,7 @@ Result<Guide> guide_curve(const StrokeSettings& s) {
 /// The guide cut into steps of at most `spacing`; its vertices stay.
 Result<std::vector<Vec3>> resampled(const std::vector<Vec3>& vertices, double spacing, double length) {
   if (length / spacing > static_cast<double>(max_samples)) {
-    return bad_value("sample_spacing", fmt::format("gives {:.0f} samples", length / spacing),
+    return bad_value(fmt::format("gives {:.0f} samples", length / spacing), "sample_spacing",
                      "2 million samples at most");
   }
   std::vector<Vec3> samples{vertices.front()};
@@ -200,9 +196,8 @@ Result<SurfacePoint> projected(const SurfaceProjector& project, const Vec3& p) {
   SurfacePoint foot = project(p);
   const double norm = foot.normal.norm();
   if (!foot.point.allFinite() || !(norm > 0.0) || !std::isfinite(norm)) {
-    return bad_value("surface",
-                     fmt::format("gives no point with a normal near ({:.6g}, {:.6g}, {:.6g}) m", p.x(), p.y(), p.z()),
-                     "a surface that the stroke can be laid on");
+    return bad_value(fmt::format("gives no point with a normal near ({:.6g}, {:.6g}, {:.6g}) m", p.x(), p.y(), p.z()),
+                     "surface", "a surface that the stroke can be laid on");
   }
   foot.normal /= norm;
   return foot;
@@ -223,7 +218,7 @@ Status bridge(const SurfaceProjector& project, std::vector<SurfacePoint>& path, 
     }
   }
   if (path.size() >= max_samples)
-    return bad_value("sample_spacing", "gives too many samples", "2 million samples at most");
+    return bad_value("gives too many samples", "sample_spacing", "2 million samples at most");
   path.push_back(next);
   return success();
 }
@@ -263,7 +258,7 @@ Result<StrokeType> find_stroke_type(std::string_view name) {
   if (const std::optional<StrokeType> type = value_named<StrokeType>(name)) return *type;
   const std::string near = nearest_name(name, all_names<StrokeType>());
   const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return bad_value("type", fmt::format("stroke type \"{}\" is not known{}", name, hint), name_list<StrokeType>());
+  return bad_value(fmt::format("stroke type \"{}\" is not known{}", name, hint), "type", name_list<StrokeType>());
 }
 
 /// Fills a StrokePath step by step; the path is immutable once it is out.
@@ -273,13 +268,13 @@ class StrokeBuilder {
       : settings_(settings), project_(project) {}
 
   Result<StrokePath> build() {
-    if (!project_) return bad_value("surface", "there is no surface to lay the stroke on", "a projector");
+    if (!project_) return bad_value("there is no surface to lay the stroke on", "surface", "a projector");
     ASPERITY_CHECK(validate_sampling(settings_));
     if (settings_.type == StrokeType::recorded) return build_recorded();
     ASPERITY_CHECK(validate_motion(settings_));
     ASPERITY_CHECK(lay_on_surface());
     if (!path_.closed_ && settings_.repeats > 1 && !settings_.back_and_forth) {
-      return bad_value("repeats", fmt::format("is {} on a stroke that does not end where it began", settings_.repeats),
+      return bad_value(fmt::format("is {} on a stroke that does not end where it began", settings_.repeats), "repeats",
                        "1, or back_and_forth");
     }
     set_timing();
@@ -291,7 +286,7 @@ class StrokeBuilder {
     ASPERITY_TRY(const Guide guide, guide_curve(settings_));
     const double length = length_of(guide.vertices);
     if (!(length > 0.0) || !std::isfinite(length)) {
-      return bad_value(to_string(settings_.type), "the stroke has no length", "points that differ");
+      return bad_value("the stroke has no length", to_string(settings_.type), "points that differ");
     }
     const double spacing = settings_.sample_spacing.value_or(length / 2000.0);
     ASPERITY_TRY(const std::vector<Vec3> samples, resampled(guide.vertices, spacing, length));
@@ -315,7 +310,7 @@ class StrokeBuilder {
       path.normals_.push_back(foot.normal);
     }
     if (path.points_.size() < 2 || path.arcs_.back() < 1e-9 * guide_length) {
-      return bad_value(to_string(settings_.type), "the stroke has no length once it lies on the surface",
+      return bad_value("the stroke has no length once it lies on the surface", to_string(settings_.type),
                        "points whose nearest surface points differ");
     }
     const double window = settings_.normal_smoothing.value_or(path.arcs_.back() / 200.0);
@@ -340,18 +335,18 @@ class StrokeBuilder {
 
   Status validate_recorded() const {
     const auto& samples = settings_.recorded;
-    if (samples.size() < 2) return bad_value("recorded", fmt::format("has {} samples", samples.size()), "two or more");
-    if (samples.size() > max_samples) return bad_value("recorded", "has too many samples", "2 million samples at most");
+    if (samples.size() < 2) return bad_value(fmt::format("has {} samples", samples.size()), "recorded", "two or more");
+    if (samples.size() > max_samples) return bad_value("has too many samples", "recorded", "2 million samples at most");
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const std::string place = fmt::format("recorded[{}]", i);
       ASPERITY_CHECK(require_finite(samples[i].position, place));
       const double time = samples[i].time.count();
       if (!std::isfinite(time) || (i > 0 && time <= samples[i - 1].time.count())) {
-        return bad_value(place, fmt::format("time is {} s", time), "finite times that increase");
+        return bad_value(fmt::format("time is {} s", time), place, "finite times that increase");
       }
     }
-    if (settings_.repeats != 1) return bad_value("repeats", "a recorded stroke is followed once", "1");
-    if (settings_.back_and_forth) return bad_value("back_and_forth", "a recorded stroke is followed once", "false");
+    if (settings_.repeats != 1) return bad_value("a recorded stroke is followed once", "repeats", "1");
+    if (settings_.back_and_forth) return bad_value("a recorded stroke is followed once", "back_and_forth", "false");
     return success();
   }
 

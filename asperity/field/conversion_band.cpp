@@ -8,15 +8,6 @@
 namespace asperity::conversion {
 namespace {
 
-constexpr int side = SparseBlock::side;
-
-/// 21 bits an axis: places are within a million blocks of the origin (resolution is bounded).
-std::uint64_t key_of(const std::array<std::int32_t, 3>& at) {
-  std::uint64_t key = 0;
-  for (const std::int32_t a : at) key = key << 21U | static_cast<std::uint64_t>((a + (1 << 20)) & ((1 << 21) - 1));
-  return key;
-}
-
 /// A point that may be in the band though the voxeliser left it out.
 struct Candidate {
   Node node;
@@ -191,8 +182,9 @@ std::array<std::int32_t, 3> place_beside(std::array<std::int32_t, 3> at, std::ui
 
 Vec3 position_of(const VoxelBlock& block, std::uint32_t point, const Vec3& origin, double voxel) noexcept {
   const auto n = static_cast<int>(point);
-  return origin + voxel * Vec3(side * block.at[0] + n % side, side * block.at[1] + n / side % side,
-                               side * block.at[2] + n / (side * side));
+  return origin + voxel * Vec3(block_side * block.at[0] + n % block_side,
+                               block_side * block.at[1] + n / block_side % block_side,
+                               block_side * block.at[2] + n / (block_side * block_side));
 }
 
 double make_exact(const TriangleIndex& index, const BandFrame& frame, std::vector<VoxelBlock>& blocks,

@@ -13,15 +13,6 @@ namespace {
 
 constexpr std::size_t most_dilated_texels = std::size_t{1} << 25U;
 
-Error bad_value(std::string what, const char* place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), "", place, std::move(accepted)};
-}
-
-Status check_pyramid_tile(const Vec2& tile) {
-  if (tile.allFinite() && tile.minCoeff() >= 1e-12) return success();
-  return bad_value(fmt::format("is {} m x {} m", tile.x(), tile.y()), "tile", "two finite lengths above 1e-12 m");
-}
-
 Status check_dilatable(const HeightMap& heights) {
   const std::size_t texels = static_cast<std::size_t>(heights.width()) * static_cast<std::size_t>(heights.height());
   if (texels <= most_dilated_texels) return success();
@@ -373,7 +364,7 @@ int octaves(double finest, const Vec2& tile, DetailKind kind) {
 }
 
 Result<DetailSettings> completed(DetailSettings settings, const HeightMap& heights, const Vec2& tile) {
-  ASPERITY_CHECK(check_pyramid_tile(tile));
+  ASPERITY_CHECK(check_tile(tile));
   if (!(std::isfinite(settings.finest) && settings.finest >= 0.0))
     return bad_value(fmt::format("is {} m", settings.finest), "finest", "a finite length, or 0 for the map's own");
   if (settings.levels < 0 || settings.levels > DetailPyramid::most_levels) {
@@ -413,7 +404,7 @@ Status check_size(const DetailSettings& settings, const HeightMap& heights, cons
 }  // namespace
 
 Result<HeightMap> dilated(const HeightMap& heights, const Vec2& tile, double radius) {
-  ASPERITY_CHECK(check_pyramid_tile(tile));
+  ASPERITY_CHECK(check_tile(tile));
   if (!(std::isfinite(radius) && radius >= 0.0))
     return bad_value(fmt::format("is {} m", radius), "radius", "a finite length of 0 or more");
   ASPERITY_CHECK(check_dilatable(heights));

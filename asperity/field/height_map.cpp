@@ -35,10 +35,6 @@ int level_step(const Image& image, Channel channel) {
   return step;
 }
 
-Error bad_value(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), "", std::move(place), std::move(accepted)};
-}
-
 Status check(const HeightMapSettings& settings) {
   if (!std::isfinite(settings.amplitude) || settings.amplitude < 0.0) {
     return bad_value(fmt::format("the amplitude is {} m", settings.amplitude), "amplitude",
@@ -153,6 +149,12 @@ bool lies_outside(double coordinate, Wrap wrap) noexcept {
 }
 
 }  // namespace
+
+Status check_tile(const Vec2& tile) {
+  constexpr double least = 1e-12;
+  if (tile.allFinite() && tile.minCoeff() >= least) return success();
+  return bad_value(fmt::format("is {} m x {} m", tile.x(), tile.y()), "tile", "two finite lengths of 1e-12 m or more");
+}
 
 Result<HeightMap> HeightMap::build(const Image& image, Channel channel, const HeightMapSettings& settings) {
   ASPERITY_CHECK(check(settings));

@@ -32,6 +32,9 @@ struct Names<Wrap> {
   static constexpr auto table = std::to_array<Named<Wrap>>({{Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}});
 };
 
+/// Errors: bad_value where this is no size of one repeat of a map (m). [any]
+Status check_tile(const Vec2& tile);
+
 /// One reading of a relief.
 struct HeightSample {
   double height = 0.0;           ///< m, positive outside the base surface

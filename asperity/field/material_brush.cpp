@@ -13,10 +13,6 @@ namespace {
 
 constexpr std::size_t roughness_channel = 4;
 
-Error bad_brush(std::string place, std::string what, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Status check_channels(const PointMaterial& material, const std::string& place) {
   static constexpr const char* units[] = {" N/m", " N·s/m", "", "", ""};
   for (std::size_t channel = 0; channel < material_channels; ++channel) {
@@ -24,8 +20,8 @@ Status check_channels(const PointMaterial& material, const std::string& place) {
     if (std::isnan(value)) continue;
     const bool above_zero = channel == 0;
     if (std::isfinite(value) && (above_zero ? value > 0.0F : value >= 0.0F)) continue;
-    return bad_brush(fmt::format("{}.{}", place, material_channel_names()[channel]),
-                     fmt::format("is {}{}", value, units[channel]),
+    return bad_value(fmt::format("is {}{}", value, units[channel]),
+                     fmt::format("{}.{}", place, material_channel_names()[channel]),
                      fmt::format("a finite value, {}{}", above_zero ? "above 0" : "0 or more", units[channel]));
   }
   return success();
@@ -39,16 +35,16 @@ bool is_empty(const PointMaterial& material) {
 }
 
 Status check_brush(const MaterialBrush& brush, const std::string& place) {
-  if (!brush.centre.allFinite()) return bad_brush(place + ".centre", "is not finite", "three finite lengths (m)");
+  if (!brush.centre.allFinite()) return bad_value("is not finite", place + ".centre", "three finite lengths (m)");
   if (!(brush.radius > 0.0) || !std::isfinite(brush.radius))
-    return bad_brush(place + ".radius", fmt::format("is {} m", brush.radius), "a length above 0");
+    return bad_value(fmt::format("is {} m", brush.radius), place + ".radius", "a length above 0");
   if (!(brush.falloff >= 0.0 && brush.falloff <= brush.radius)) {
-    return bad_brush(place + ".falloff", fmt::format("is {} m", brush.falloff),
+    return bad_value(fmt::format("is {} m", brush.falloff), place + ".falloff",
                      fmt::format("0 up to the radius, {} m", brush.radius));
   }
   ASPERITY_CHECK(check_channels(brush.material, place));
   if (is_empty(brush.material)) {
-    return bad_brush(place, "gives no channel a value",
+    return bad_value("gives no channel a value", place,
                      "at least one of stiffness, damping, static_friction, dynamic_friction, roughness");
   }
   return success();
@@ -77,7 +73,7 @@ class Painting {
       reached = lay_on(b, brush, number) || reached;
     }
     if (reached) return success();
-    return bad_brush(fmt::format("[{}]", number), "touches no stored point",
+    return bad_value("touches no stored point", fmt::format("[{}]", number),
                      fmt::format("a ball that reaches the surface; points are stored near it, {:.4g} mm apart",
                                  1e3 * source_.voxel));
   }
@@ -153,10 +149,10 @@ class Painting {
       const float sliding = std::isnan(material.dynamic_friction) ? own_.dynamic_friction : material.dynamic_friction;
       if (!(at_rest < sliding)) continue;
       if (at_rest < sliding * (1.0F - rounding)) {
-        return bad_brush(
-            fmt::format("[{}].static_friction", touched_[b][point]),
+        return bad_value(
             fmt::format("is {} where dynamic_friction is {}, other brushes and the surface's own considered", at_rest,
                         sliding),
+            fmt::format("[{}].static_friction", touched_[b][point]),
             "a static friction not below the dynamic one everywhere");
       }
       if (std::isnan(material.static_friction)) {
@@ -184,8 +180,8 @@ Result<SparseGrid> painted(const SparseGrid& grid, std::span<const MaterialBrush
     ASPERITY_CHECK(check_brush(brushes[n], fmt::format("[{}]", n)));
     for (std::size_t channel = 0; channel < material_channels; ++channel) {
       if (std::isnan(brushes[n].material.get(channel)) || !std::isnan(fallback.get(channel))) continue;
-      return bad_brush(fmt::format("own.{}", material_channel_names()[channel]),
-                       "is not given, and a brush fades to it", "the surface's own value");
+      return bad_value("is not given, and a brush fades to it",
+                       fmt::format("own.{}", material_channel_names()[channel]), "the surface's own value");
     }
   }
   Painting painting(grid, fallback);

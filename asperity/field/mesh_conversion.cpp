@@ -30,10 +30,6 @@ std::atomic<MeshVoxelizer>& registered() {
   return voxelizer;
 }
 
-Error bad_conversion(std::string place, std::string what, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 double longest_side(const TriangleMesh& mesh) {
   return mesh.bounds().extent().maxCoeff();
 }
@@ -41,33 +37,31 @@ double longest_side(const TriangleMesh& mesh) {
 Status check_settings(const TriangleMesh& mesh, const ConversionSettings& settings) {
   const auto no_length = [](double value) { return !(value >= 0.0) || std::isinf(value); };
   if (no_length(settings.voxel))
-    return bad_conversion("voxel", fmt::format("is {}", settings.voxel), "a length above 0 (m)");
+    return bad_value(fmt::format("is {}", settings.voxel), "voxel", "a length above 0 (m)");
   const int given =
       (settings.voxel > 0.0 ? 1 : 0) + (settings.resolution > 0 ? 1 : 0) + (settings.budget_bytes > 0 ? 1 : 0);
-  if (given > 1) return bad_conversion("voxel", "is given besides another size", "one of voxel, resolution and budget");
+  if (given > 1) return bad_value("is given besides another size", "voxel", "one of voxel, resolution and budget");
   if (settings.resolution > 0 && (settings.resolution < static_cast<std::uint32_t>(least_resolution) ||
                                   settings.resolution > static_cast<std::uint32_t>(most_resolution)))
-    return bad_conversion("resolution", fmt::format("is {}", settings.resolution),
-                          "8 to 4096 voxels along the longest side");
+    return bad_value(fmt::format("is {}", settings.resolution), "resolution",
+                     "8 to 4096 voxels along the longest side");
   const double longest = longest_side(mesh);
   if (settings.voxel > 0.0 && (settings.voxel < longest / most_resolution * (1.0 - 1e-9) ||
                                settings.voxel > longest / least_resolution * (1.0 + 1e-9))) {
-    return bad_conversion("voxel", fmt::format("is {} m, on a mesh {} m long", settings.voxel, longest),
-                          fmt::format("{} to {} m: 8 to 4096 voxels along the longest side", longest / most_resolution,
-                                      longest / least_resolution));
+    return bad_value(fmt::format("is {} m, on a mesh {} m long", settings.voxel, longest), "voxel",
+                     fmt::format("{} to {} m: 8 to 4096 voxels along the longest side", longest / most_resolution,
+                                 longest / least_resolution));
   }
   if (no_length(settings.band_outside))
-    return bad_conversion("band_outside", fmt::format("is {}", settings.band_outside),
-                          "a finite length, 0 or more (m)");
+    return bad_value(fmt::format("is {}", settings.band_outside), "band_outside", "a finite length, 0 or more (m)");
   if (!(settings.band_inside >= 0.0))
-    return bad_conversion("band_inside", fmt::format("is {}", settings.band_inside),
-                          "a length, 0 or more (m), or infinity");
+    return bad_value(fmt::format("is {}", settings.band_inside), "band_inside", "a length, 0 or more (m), or infinity");
   if (no_length(settings.shell_thickness))
-    return bad_conversion("shell_thickness", fmt::format("is {}", settings.shell_thickness),
-                          "a finite length, 0 or more (m)");
+    return bad_value(fmt::format("is {}", settings.shell_thickness), "shell_thickness",
+                     "a finite length, 0 or more (m)");
   if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
-    return bad_conversion("shell_thickness", fmt::format("is given for rule {}", to_string(settings.rule)),
-                          "rule shell or automatic");
+    return bad_value(fmt::format("is given for rule {}", to_string(settings.rule)), "shell_thickness",
+                     "rule shell or automatic");
   return success();
 }
 
@@ -195,8 +189,8 @@ class Converter {
     if (const double bytes = estimated_bytes(voxel); bytes > 2.0 * most) return too_large(bytes, most);
     Attempt attempt = planned(voxel);
     if (attempt.thickness > 0.0 && attempt.thickness < 2.0 * voxel * (1.0 - 1e-9)) {
-      return bad_conversion("shell_thickness", fmt::format("is {} m, with a voxel of {} m", attempt.thickness, voxel),
-                            fmt::format("{} m or more: two voxels", 2.0 * voxel));
+      return bad_value(fmt::format("is {} m, with a voxel of {} m", attempt.thickness, voxel), "shell_thickness",
+                       fmt::format("{} m or more: two voxels", 2.0 * voxel));
     }
     VoxelRequest request;
     request.positions.reserve(mesh_.positions().size());
@@ -263,8 +257,8 @@ class Converter {
   }
 
   [[nodiscard]] Error too_small(double bytes) const {
-    return bad_conversion(
-        "budget", fmt::format("of {} bytes is not enough for 8 voxels along the longest side", settings_.budget_bytes),
+    return bad_value(
+        fmt::format("of {} bytes is not enough for 8 voxels along the longest side", settings_.budget_bytes), "budget",
         fmt::format("about {:.0f} bytes or more", bytes));
   }
 
@@ -368,7 +362,7 @@ class Converter {
 
 Result<InsideRule> parse_inside_rule(std::string_view name) {
   if (const std::optional<InsideRule> rule = value_named<InsideRule>(name)) return *rule;
-  return bad_conversion({}, fmt::format("is \"{}\"", name), name_list<InsideRule>("\"", " or "));
+  return bad_value(fmt::format("is \"{}\"", name), {}, name_list<InsideRule>("\"", " or "));
 }
 
 void register_mesh_voxelizer(MeshVoxelizer voxelizer) {

@@ -23,13 +23,6 @@ constexpr int fewest_blocks_a_side = 16;
 constexpr double least_outward = 1.0 / 127.0;
 
 // Below this a slope of the relief could leave the range of a double, and with it a force (m).
-constexpr double least_tile = 1e-12;
-
-Status check_mesostructure_tile(const Vec2& tile) {
-  if (tile.allFinite() && tile.minCoeff() >= least_tile) return success();
-  return Error{ErrorCode::bad_value, fmt::format("the tile is {} m by {} m", tile.x(), tile.y()), "", "tile",
-               "two finite lengths of at least 1e-12 m"};
-}
 
 /// Slopes of the heights (m/m) by central differences over two texels, whatever the reconstruction.
 Vec2 slope_of_heights(const HeightMap& heights, const Vec2& st, const Vec2& tile) {
@@ -153,12 +146,12 @@ Mesostructure::Mesostructure(HeightMap heights, std::optional<NormalMap> normals
     : heights_(std::move(heights)), normals_(std::move(normals)), tile_(tile) {}
 
 Result<Mesostructure> Mesostructure::build(HeightMap heights, const Vec2& tile) {
-  ASPERITY_CHECK(check_mesostructure_tile(tile));
+  ASPERITY_CHECK(check_tile(tile));
   return Mesostructure(std::move(heights), std::nullopt, tile);
 }
 
 Result<Mesostructure> Mesostructure::build(HeightMap heights, NormalMap normals, const Vec2& tile) {
-  ASPERITY_CHECK(check_mesostructure_tile(tile));
+  ASPERITY_CHECK(check_tile(tile));
   if (heights.wrap() != normals.wrap()) {
     return Error{ErrorCode::mismatch,
                  fmt::format("the height map wraps by {}, its normal map by {}", to_string(heights.wrap()),

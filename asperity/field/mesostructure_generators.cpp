@@ -29,23 +29,20 @@ constexpr std::array<Kind, 8> kinds{{
     {MesostructureKind::fractal, "H_7", {"hurst", "octaves", "seed"}},
 }};
 
-Error refusal(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), "", std::move(place), std::move(accepted)};
-}
-
 Error unknown_kind() {
-  return refusal("an unknown mesostructure", "kind", "one of the named kinds");
+  return bad_value("an unknown mesostructure", "kind", "one of the named kinds");
 }
 
 /// Whether a number lies in its closed range; `what` says which ("the width is").
 Status within(double value, double low, double high, const char* place, const char* what) {
   if (value >= low && value <= high) return success();
-  return refusal(fmt::format("{} {:.4g}", what, value), place, fmt::format("{:.4g} to {:.4g}", low, high));
+  return bad_value(fmt::format("{} {:.4g}", what, value), place, fmt::format("{:.4g} to {:.4g}", low, high));
 }
 
 Status check_count(const MesostructureSpec& spec, int most) {
   if (spec.count >= 1 && spec.count <= most) return success();
-  return refusal(fmt::format("{} repeats on {} texels", spec.count, spec.size), "count", fmt::format("1 to {}", most));
+  return bad_value(fmt::format("{} repeats on {} texels", spec.count, spec.size), "count",
+                   fmt::format("1 to {}", most));
 }
 
 Status check_number(const MesostructureSpec& spec, int most) {
@@ -96,12 +93,12 @@ Status check_fractal(const MesostructureSpec& spec) {
 /// `spec` is completed.
 Status check(const MesostructureSpec& spec) {
   if (spec.size < 2 || spec.size > 8192) {
-    return refusal(fmt::format("{} texels a side", spec.size), "size", "2 to 8192 texels");
+    return bad_value(fmt::format("{} texels a side", spec.size), "size", "2 to 8192 texels");
   }
   const bool flat = spec.kind == MesostructureKind::flat;
   if (!std::isfinite(spec.amplitude) || (spec.amplitude < 0.0 && !flat)) {
-    return refusal(fmt::format("the amplitude is {} m", spec.amplitude), "amplitude",
-                   flat ? "a finite height" : "a finite length of 0 or more");
+    return bad_value(fmt::format("the amplitude is {} m", spec.amplitude), "amplitude",
+                     flat ? "a finite height" : "a finite length of 0 or more");
   }
   switch (spec.kind) {
     case MesostructureKind::flat: return success();
@@ -119,8 +116,8 @@ Status check(const MesostructureSpec& spec) {
 /// The heights, when as many found a place as were asked for.
 Result<std::vector<float>> all_placed(ScatteredHeights scattered, const MesostructureSpec& spec) {
   if (scattered.placed >= spec.number.value_or(0)) return std::move(scattered.heights);
-  return refusal(fmt::format("only {} of {} find a place", scattered.placed, *spec.number), "number",
-                 "fewer, or smaller radii");
+  return bad_value(fmt::format("only {} of {} find a place", scattered.placed, *spec.number), "number",
+                   "fewer, or smaller radii");
 }
 
 }  // namespace

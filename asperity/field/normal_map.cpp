@@ -67,10 +67,7 @@ Result<NormalMap> NormalMap::build(const Image& image, const NormalMapSettings& 
 }
 
 Result<NormalMap> NormalMap::build(const HeightMap& heights, const Vec2& tile, NormalFilter filter) {
-  if (!tile.allFinite() || tile.minCoeff() <= 0.0) {
-    return Error{ErrorCode::bad_value, fmt::format("the tile is {} m by {} m", tile.x(), tile.y()), "", "tile",
-                 "two lengths above 0"};
-  }
+  ASPERITY_CHECK(check_tile(tile));
   NormalMap map;
   map.allocate(heights.width(), heights.height(), heights.wrap(), filter);
   for (int y = 0; y < map.height_; ++y) {

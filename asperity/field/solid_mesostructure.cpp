@@ -23,26 +23,22 @@ constexpr double most_noise = 1.0364;
 constexpr double most_noise_slope = 3.751;
 constexpr double most_noise_bend = 14.6;
 
-Error refusal(std::string what, const char* place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), "", place, std::move(accepted)};
-}
-
 Status check_length(double value, const char* place) {
   if (std::isfinite(value) && value >= 1e-12) return success();
-  return refusal(fmt::format("is {} m", value), place, "a finite length above 0 (1e-12 m or more)");
+  return bad_value(fmt::format("is {} m", value), place, "a finite length above 0 (1e-12 m or more)");
 }
 
 Status check_finite(const Vec3& value, const char* place) {
   if (value.allFinite()) return success();
-  return refusal("is not finite", place, "three finite numbers");
+  return bad_value("is not finite", place, "three finite numbers");
 }
 
 Status check_noise(const SolidSpec& spec) {
   ASPERITY_CHECK(check_finite(spec.drift, "drift"));
   if (spec.octaves < 1 || spec.octaves > 8)
-    return refusal(fmt::format("there are to be {}", spec.octaves), "octaves", "1 to 8");
+    return bad_value(fmt::format("there are to be {}", spec.octaves), "octaves", "1 to 8");
   if (!(spec.persistence >= 0.0 && spec.persistence <= 1.0))
-    return refusal(fmt::format("is {}", spec.persistence), "persistence", "0 to 1");
+    return bad_value(fmt::format("is {}", spec.persistence), "persistence", "0 to 1");
   return success();
 }
 
@@ -50,15 +46,15 @@ Status check(const SolidSpec& spec) {
   ASPERITY_CHECK(check_length(spec.amplitude, "amplitude"));
   ASPERITY_CHECK(check_length(spec.wavelength, "wavelength"));
   if (spec.kind == SolidKind::noise) return check_noise(spec);
-  if (!std::isfinite(spec.frequency)) return refusal("is not finite", "frequency", "a finite frequency (Hz)");
+  if (!std::isfinite(spec.frequency)) return bad_value("is not finite", "frequency", "a finite frequency (Hz)");
   ASPERITY_CHECK(check_finite(spec.centre, "centre"));
-  if (!std::isfinite(spec.phase)) return refusal("is not finite", "phase", "a finite angle (rad)");
+  if (!std::isfinite(spec.phase)) return bad_value("is not finite", "phase", "a finite angle (rad)");
   const double length = spec.direction.norm();
   const bool directed = spec.kind == SolidKind::waves || spec.kind == SolidKind::lattice;
   if (directed && !(std::isfinite(length) && length > 1e-100))
-    return refusal("has no direction", "direction", "three finite numbers that are not all 0");
+    return bad_value("has no direction", "direction", "three finite numbers that are not all 0");
   if (spec.kind == SolidKind::pulse && !(spec.frequency > 0.0))
-    return refusal(fmt::format("is {} Hz: the pulse would never rise", spec.frequency), "frequency", "above 0 Hz");
+    return bad_value(fmt::format("is {} Hz: the pulse would never rise", spec.frequency), "frequency", "above 0 Hz");
   return success();
 }
 
@@ -213,9 +209,9 @@ CellJet noise_at(const Vec3& cells, std::uint64_t key) noexcept {
 Result<SolidKind> parse_solid_kind(const std::string& name) {
   if (const std::optional<SolidKind> kind = value_named<SolidKind>(name)) return *kind;
   const std::string meant = nearest_name(name, all_names<SolidKind>());
-  return refusal(fmt::format("no solid mesostructure is called '{}'{}", name,
-                             meant.empty() ? std::string() : fmt::format(", did you mean '{}'?", meant)),
-                 "", name_list<SolidKind>());
+  return bad_value(fmt::format("no solid mesostructure is called '{}'{}", name,
+                               meant.empty() ? std::string() : fmt::format(", did you mean '{}'?", meant)),
+                   "", name_list<SolidKind>());
 }
 
 Result<SolidMesostructure> SolidMesostructure::build(const SolidSpec& spec) {

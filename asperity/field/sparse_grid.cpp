@@ -17,10 +17,6 @@ constexpr int material_side = block_side + 1;
 constexpr std::size_t material_points = material_side * material_side * material_side;
 constexpr std::size_t most_table = std::size_t{1} << 27;  // 4,096 voxels a side, some 2 GB
 
-Error bad_grid(std::string place, std::string what, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 /// Place of a point of a brick's apron, -1 … 9 along each axis.
 constexpr std::size_t apron_index(int i, int j, int k) noexcept {
   return static_cast<std::size_t>(i + 1 + apron_side * (j + 1 + apron_side * (k + 1)));
@@ -29,15 +25,15 @@ constexpr std::size_t apron_index(int i, int j, int k) noexcept {
 Status check_material(const PointMaterial& m, const std::string& place) {
   const auto good = [](float value, bool fits) { return std::isnan(value) || (std::isfinite(value) && fits); };
   if (!good(m.stiffness, m.stiffness > 0.0F))
-    return bad_grid(place + ".stiffness", fmt::format("is {}", m.stiffness), "above 0 (N/m)");
+    return bad_value(fmt::format("is {}", m.stiffness), place + ".stiffness", "above 0 (N/m)");
   if (!good(m.damping, m.damping >= 0.0F))
-    return bad_grid(place + ".damping", fmt::format("is {}", m.damping), "0 or more (N·s/m)");
+    return bad_value(fmt::format("is {}", m.damping), place + ".damping", "0 or more (N·s/m)");
   if (!good(m.static_friction, m.static_friction >= 0.0F))
-    return bad_grid(place + ".static_friction", fmt::format("is {}", m.static_friction), "0 or more");
+    return bad_value(fmt::format("is {}", m.static_friction), place + ".static_friction", "0 or more");
   if (!good(m.dynamic_friction, m.dynamic_friction >= 0.0F))
-    return bad_grid(place + ".dynamic_friction", fmt::format("is {}", m.dynamic_friction), "0 or more");
+    return bad_value(fmt::format("is {}", m.dynamic_friction), place + ".dynamic_friction", "0 or more");
   if (!good(m.roughness, m.roughness >= 0.0F))
-    return bad_grid(place + ".roughness", fmt::format("is {}", m.roughness), "0 or more");
+    return bad_value(fmt::format("is {}", m.roughness), place + ".roughness", "0 or more");
   return success();
 }
 
@@ -45,16 +41,16 @@ Status check_block(const SparseBlock& block, std::size_t number) {
   const std::string place = fmt::format("blocks[{}]", number);
   for (const std::int32_t at : block.at) {
     if (std::abs(static_cast<std::int64_t>(at)) > (1 << 24))
-      return bad_grid(place, fmt::format("is at {}", at), "places within 16 million blocks of the origin");
+      return bad_value(fmt::format("is at {}", at), place, "places within 16 million blocks of the origin");
   }
   for (std::size_t i = 0; i < block.value.size(); ++i) {
     if (!std::isfinite(block.value[i]))
-      return bad_grid(fmt::format("{}.value[{}]", place, i), "is not a finite number", "distances (m)");
+      return bad_value("is not a finite number", fmt::format("{}.value[{}]", place, i), "distances (m)");
   }
   if (!block.face.empty() && block.face.size() != SparseBlock::points)
-    return bad_grid(place + ".face", fmt::format("has {} entries", block.face.size()), "512 or none");
+    return bad_value(fmt::format("has {} entries", block.face.size()), place + ".face", "512 or none");
   if (!block.material.empty() && block.material.size() != SparseBlock::points)
-    return bad_grid(place + ".material", fmt::format("has {} entries", block.material.size()), "512 or none");
+    return bad_value(fmt::format("has {} entries", block.material.size()), place + ".material", "512 or none");
   for (std::size_t i = 0; i < block.material.size(); ++i)
     ASPERITY_CHECK(check_material(block.material[i], fmt::format("{}.material[{}]", place, i)));
   return success();
@@ -62,13 +58,13 @@ Status check_block(const SparseBlock& block, std::size_t number) {
 
 Status check_source(const SparseSource& source) {
   if (!(source.voxel > 0.0) || !std::isfinite(source.voxel))
-    return bad_grid("voxel", fmt::format("is {}", source.voxel), "a length above 0 (m)");
-  if (!source.origin.allFinite()) return bad_grid("origin", "is not finite", "three finite lengths (m)");
+    return bad_value(fmt::format("is {}", source.voxel), "voxel", "a length above 0 (m)");
+  if (!source.origin.allFinite()) return bad_value("is not finite", "origin", "three finite lengths (m)");
   if (!(source.outside > 0.0) || !std::isfinite(source.outside))
-    return bad_grid("outside", fmt::format("is {}", source.outside), "a length above 0 (m)");
+    return bad_value(fmt::format("is {}", source.outside), "outside", "a length above 0 (m)");
   if (!(source.inside < 0.0) || !std::isfinite(source.inside))
-    return bad_grid("inside", fmt::format("is {}", source.inside), "a length below 0 (m)");
-  if (source.blocks.empty()) return bad_grid("blocks", "holds none", "at least one block");
+    return bad_value(fmt::format("is {}", source.inside), "inside", "a length below 0 (m)");
+  if (source.blocks.empty()) return bad_value("holds none", "blocks", "at least one block");
   if (source.blocks.size() > SparseGrid::most_bricks) {
     return Error{ErrorCode::too_large,
                  fmt::format("holds {} blocks", source.blocks.size()),
@@ -281,7 +277,7 @@ Result<SparseGrid> SparseGrid::build(SparseSource source) {
                                                static_cast<std::uint32_t>(block.at[1] - grid.first_[1]),
                                                static_cast<std::uint32_t>(block.at[2] - grid.first_[2]));
     if (blocks[entry] != nullptr)
-      return bad_grid(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
+      return bad_value("is at the place of an earlier one", fmt::format("blocks[{}]", b), "each block once");
     blocks[entry] = &block;
     grid.table_[entry] = static_cast<std::int32_t>(b);
   }
@@ -351,9 +347,9 @@ Result<SparseGrid> SparseGrid::edited(std::vector<SparseBlock> changed) const {
       entry = entry * counts_[a] + static_cast<std::size_t>(here ? at : 0);
     }
     if (!here || table_[entry] < 0)
-      return bad_grid(fmt::format("blocks[{}]", b), "is not stored in the grid", "blocks of source()");
+      return bad_value("is not stored in the grid", fmt::format("blocks[{}]", b), "blocks of source()");
     if (blocks[entry] != nullptr)
-      return bad_grid(fmt::format("blocks[{}]", b), "is at the place of an earlier one", "each block once");
+      return bad_value("is at the place of an earlier one", fmt::format("blocks[{}]", b), "each block once");
     blocks[entry] = &block;
     around(entry, [&](std::size_t next) { wanted[next] = wanted[next] || table_[next] >= 0; });
   }

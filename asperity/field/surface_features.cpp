@@ -52,19 +52,14 @@ bool takes(FeatureKind kind, std::string_view member) {
   return std::find(all.begin(), all.end(), member) != all.end();
 }
 
-Error feature_refusal(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Status length_within(double value, double least, const char* place) {
   if (value >= least && value <= longest) return success();
-  return feature_refusal(fmt::format("is {:.6g} m", value), place,
-                         fmt::format("a length of {:g} to {:g} m", least, longest));
+  return bad_value(fmt::format("is {:.6g} m", value), place, fmt::format("a length of {:g} to {:g} m", least, longest));
 }
 
 Status finite(double value, const char* place, const char* accepted) {
   if (std::isfinite(value) && std::abs(value) <= 1e6) return success();
-  return feature_refusal(fmt::format("is {:.6g}", value), place, accepted);
+  return bad_value(fmt::format("is {:.6g}", value), place, accepted);
 }
 
 Status check_shape(const FeatureSpec& spec) {
@@ -75,13 +70,13 @@ Status check_shape(const FeatureSpec& spec) {
   if (takes(spec.kind, "direction")) ASPERITY_CHECK(finite(spec.direction, "direction", "an angle up to 1e6 rad"));
   if (takes(spec.kind, "phase")) ASPERITY_CHECK(finite(spec.phase, "phase", "an angle up to 1e6 rad"));
   if (takes(spec.kind, "centre") && !(spec.centre.norm() <= longest)) {
-    return feature_refusal(fmt::format("is {:.6g}, {:.6g} m", spec.centre.x(), spec.centre.y()), "centre",
-                           fmt::format("a place within {:g} m of the origin", longest));
+    return bad_value(fmt::format("is {:.6g}, {:.6g} m", spec.centre.x(), spec.centre.y()), "centre",
+                     fmt::format("a place within {:g} m of the origin", longest));
   }
   if (takes(spec.kind, "wall") && !(spec.wall >= 0.01 && spec.wall <= 0.5))
-    return feature_refusal(fmt::format("is {:.6g}", spec.wall), "wall", "a share of 0.01 to 0.5 of the wavelength");
+    return bad_value(fmt::format("is {:.6g}", spec.wall), "wall", "a share of 0.01 to 0.5 of the wavelength");
   if (spec.kind == FeatureKind::map && spec.heights == nullptr)
-    return feature_refusal("is not given", "heights", "a height map");
+    return bad_value("is not given", "heights", "a height map");
   return success();
 }
 
@@ -180,9 +175,9 @@ Result<int> cells_along(double period, double spacing) {
   if (period == 0.0) return usual_cells;
   const double cells = std::round(period / spacing);
   if (period > 0.0 && cells >= fewest_cells && cells <= most_cells) return static_cast<int>(cells);
-  return feature_refusal(fmt::format("is {:.6g} m", period), "period",
-                         fmt::format("0, or a length of {:.4g} to {:.4g} m with this correlation length",
-                                     fewest_cells * spacing, spacing * most_cells));
+  return bad_value(fmt::format("is {:.6g} m", period), "period",
+                   fmt::format("0, or a length of {:.4g} to {:.4g} m with this correlation length",
+                               fewest_cells * spacing, spacing * most_cells));
 }
 
 /// Cubic B-spline over the four coefficients around a place `t` (0 to 1) between the middle two.
@@ -242,7 +237,7 @@ Status SurfaceFeature::prepare_noise() {
 
 Result<SurfaceFeature> SurfaceFeature::build(const FeatureSpec& spec) {
   if (static_cast<std::size_t>(spec.kind) >= feature_table().size())
-    return feature_refusal("is unknown", "kind", name_list<FeatureKind>());
+    return bad_value("is unknown", "kind", name_list<FeatureKind>());
   ASPERITY_CHECK(check_shape(spec));
   SurfaceFeature feature;
   feature.spec_ = spec;
@@ -385,9 +380,8 @@ const std::vector<std::string>& feature_names() {
 Result<FeatureKind> feature_by_name(std::string_view name) {
   if (const std::optional<FeatureKind> kind = value_named<FeatureKind>(name)) return *kind;
   const std::string near = nearest_name(name, feature_names());
-  return feature_refusal(
-      fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)), "kind",
-      name_list<FeatureKind>());
+  return bad_value(fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)),
+                   "kind", name_list<FeatureKind>());
 }
 
 const std::vector<std::string>& feature_parameters(FeatureKind kind) {
@@ -414,12 +408,12 @@ Result<HeightMap> bake(const std::vector<SurfaceFeature>& features, const Vec2& 
                        int rows, Wrap wrap) {
   const Vec2 extent = upper - lower;
   if (!lower.allFinite() || !extent.allFinite() || !(extent.minCoeff() > 0.0)) {
-    return feature_refusal(
+    return bad_value(
         fmt::format("runs from {:.6g}, {:.6g} to {:.6g}, {:.6g} m", lower.x(), lower.y(), upper.x(), upper.y()),
         "rectangle", "an upper corner above and to the right of the lower one");
   }
   if (columns < 1 || rows < 1)
-    return feature_refusal(fmt::format("is {} x {}", columns, rows), "texels", "1 or more along each axis");
+    return bad_value(fmt::format("is {} x {}", columns, rows), "texels", "1 or more along each axis");
   if (columns > most_side || rows > most_side || std::int64_t{columns} * rows > most_feature_texels) {
     return Error{ErrorCode::too_large,
                  fmt::format("is {} x {}", columns, rows),

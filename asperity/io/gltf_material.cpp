@@ -20,6 +20,7 @@ namespace {
 
 using Json = nlohmann::json;
 using mesh_readers::GltfDocument;
+using mesh_readers::malformed;
 using mesh_readers::PrimitiveLook;
 using mesh_readers::PrimitiveLooks;
 
@@ -28,10 +29,6 @@ constexpr const char* haptic_extensions[] = {"MPEG_haptic_material", "MPEG_mater
 constexpr const char* haptic_properties[] = {"stiffness",   "friction",  "vibrotactileTexture",
                                              "temperature", "vibration", "custom"};
 constexpr const char* texture_types[] = {"High_Resolution", "Low_Resolution", "Reference", "Other"};
-
-Error malformed_material(std::string what, std::string place, std::string accepted) {
-  return {ErrorCode::file_malformed, std::move(what), {}, std::move(place), std::move(accepted)};
-}
 
 /// The member of that name, if `from` is an object that has it.
 const Json* member(const Json& from, const char* key) {
@@ -45,10 +42,10 @@ const Json* member(const Json* from, const char* key) {
 }
 
 Result<int> index_in(const Json& value, std::size_t count, const char* section, const std::string& place) {
-  if (!value.is_number_unsigned()) return malformed_material("is no index", place, "a whole number from 0");
+  if (!value.is_number_unsigned()) return malformed("is no index", place, "a whole number from 0");
   if (value.get<std::uint64_t>() >= count) {
-    return malformed_material(fmt::format("refers to {}[{}] of {}", section, value.get<std::uint64_t>(), count), place,
-                              "indices of things that are there");
+    return malformed(fmt::format("refers to {}[{}] of {}", section, value.get<std::uint64_t>(), count), place,
+                     "indices of things that are there");
   }
   return value.get<int>();
 }
@@ -64,8 +61,8 @@ Result<double> number_at(const Json& object, const char* key, double fallback, c
   if (value == nullptr) return fallback;
   const double number = value->is_number() ? value->get<double>() : std::nan("");
   if (std::isfinite(number) && (negative || number >= 0.0)) return number;
-  return malformed_material("is no such number", fmt::format("{}.{}", place, key),
-                            negative ? "a finite number" : "a number of 0 or more");
+  return malformed("is no such number", fmt::format("{}.{}", place, key),
+                   negative ? "a finite number" : "a number of 0 or more");
 }
 
 std::string text_of(const Json* value) {
@@ -100,7 +97,7 @@ struct Plan {
 
 /// What `extras.asperity` may hold.
 Status only_keys(const Json& object, std::initializer_list<std::string_view> known, const std::string& place) {
-  if (!object.is_object()) return malformed_material("is no object", place, "an object");
+  if (!object.is_object()) return malformed("is no object", place, "an object");
   for (const auto& [key, value] : object.items()) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     std::string accepted;
@@ -116,8 +113,8 @@ Result<PrimitiveLook> read_lie(const Json& info, const std::string& place) {
     const Json* texcoord = member(from, "texCoord");
     if (texcoord == nullptr) return success();
     if (!texcoord->is_number_unsigned() || texcoord->get<std::uint64_t>() >= mesh_readers::most_texcoords) {
-      return malformed_material("is no set of texture coordinates", at + ".texCoord",
-                                fmt::format("0 to {}", mesh_readers::most_texcoords - 1));
+      return malformed("is no set of texture coordinates", at + ".texCoord",
+                       fmt::format("0 to {}", mesh_readers::most_texcoords - 1));
     }
     lie.texcoord = texcoord->get<int>();
     return success();
@@ -126,13 +123,13 @@ Result<PrimitiveLook> read_lie(const Json& info, const std::string& place) {
   const Json* moved = member(member(info, "extensions"), "KHR_texture_transform");
   if (moved == nullptr) return lie;
   const std::string at = place + ".extensions.KHR_texture_transform";
-  if (!moved->is_object()) return malformed_material("is no object", at, "an object");
+  if (!moved->is_object()) return malformed("is no object", at, "an object");
   ASPERITY_CHECK(set(*moved, at));
   const auto pair = [&](const char* key, double fallback) -> Result<Vec2> {
     const Json* value = member(*moved, key);
     if (value == nullptr) return Vec2(fallback, fallback);
     const bool good = value->is_array() && value->size() == 2 && (*value)[0].is_number() && (*value)[1].is_number();
-    if (!good) return malformed_material("is no pair of numbers", fmt::format("{}.{}", at, key), "two numbers");
+    if (!good) return malformed("is no pair of numbers", fmt::format("{}.{}", at, key), "two numbers");
     return Vec2((*value)[0].get<double>(), (*value)[1].get<double>());
   };
   ASPERITY_TRY(const Vec2 offset, pair("offset", 0.0));
@@ -181,7 +178,7 @@ class MaterialPlanner {
       haptic_place_ = fmt::format("extensions.{}.materials", name);
       haptic_ = member(*extension, "materials");
       if (haptic_ == nullptr || !haptic_->is_array() || haptic_->empty())
-        return malformed_material("is no list of haptic materials", haptic_place_, "an array of at least one");
+        return malformed("is no list of haptic materials", haptic_place_, "an array of at least one");
     }
     return success();
   }
@@ -194,7 +191,7 @@ class MaterialPlanner {
       const std::string at = fmt::format("{}.extensions.{}", place, name);
       const Json* index = extension->is_object() ? member(*extension, "hapticMaterialIndex") : extension;
       if (index == nullptr)
-        return malformed_material("is missing", at + ".hapticMaterialIndex", "the index of a haptic material");
+        return malformed("is missing", at + ".hapticMaterialIndex", "the index of a haptic material");
       return index_in(*index, haptic_ == nullptr ? 0 : haptic_->size(), "haptic materials",
                       extension->is_object() ? at + ".hapticMaterialIndex" : at);
     }
@@ -225,7 +222,7 @@ class MaterialPlanner {
     TextureInfo read;
     read.place = place;
     const Json* index = member(info, "index");
-    if (index == nullptr) return malformed_material("is missing", place + ".index", "the index of a texture");
+    if (index == nullptr) return malformed("is missing", place + ".index", "the index of a texture");
     ASPERITY_TRY(read.texture, index_in(*index, count_of(root_, "textures"), "textures", place + ".index"));
     ASPERITY_TRY(read.lie, read_lie(info, place));
     return read;
@@ -257,8 +254,7 @@ class MaterialPlanner {
     const std::string at = place + ".extras.asperity";
     ASPERITY_CHECK(only_keys(*own, {"height_texture", "amplitude", "offset", "white_is"}, at));
     const Json* texture = member(*own, "height_texture");
-    if (texture == nullptr)
-      return malformed_material("is missing", at + ".height_texture", "a texture: {\"index\": 0}");
+    if (texture == nullptr) return malformed("is missing", at + ".height_texture", "a texture: {\"index\": 0}");
     return read_height(*own, at, *texture, at + ".height_texture", plan);
   }
 
@@ -266,8 +262,7 @@ class MaterialPlanner {
                      Plan& plan) {
     GltfHeight height;
     if (member(own, "amplitude") == nullptr) {
-      return malformed_material("is missing", place + ".amplitude",
-                                "the heights of white over black in metres, 0 or more");
+      return malformed("is missing", place + ".amplitude", "the heights of white over black in metres, 0 or more");
     }
     ASPERITY_TRY(height.amplitude, number_at(own, "amplitude", 0.0, place, false));
     ASPERITY_TRY(height.offset, number_at(own, "offset", 0.0, place));
@@ -283,7 +278,7 @@ class MaterialPlanner {
   }
 
   Status read_haptic(const Json& json, const std::string& place, Plan& plan) {
-    if (!json.is_object()) return malformed_material("is no object", place, "an object");
+    if (!json.is_object()) return malformed("is no object", place, "an object");
     plan.material.haptic_name = text_of(member(json, "name"));
     if (json.contains("haptic")) {
       notes_.push_back(place + ".haptic left out: signals of MPEG_haptic are not read");
@@ -298,7 +293,7 @@ class MaterialPlanner {
         ASPERITY_CHECK(read_entry(property, *list, at, plan));
         continue;
       }
-      if (!list->is_array()) return malformed_material("is no list of textures", at, "an array of textures");
+      if (!list->is_array()) return malformed("is no list of textures", at, "an array of textures");
       for (std::size_t i = 0; i < list->size(); ++i)
         ASPERITY_CHECK(read_entry(property, (*list)[i], fmt::format("{}[{}]", at, i), plan));
     }
@@ -309,7 +304,7 @@ class MaterialPlanner {
     Entry entry;
     entry.property = property;
     const Json* texture = member(json, "texture");
-    if (texture == nullptr) return malformed_material("is missing", place + ".texture", "a texture: {\"index\": 0}");
+    if (texture == nullptr) return malformed("is missing", place + ".texture", "a texture: {\"index\": 0}");
     ASPERITY_TRY(entry.info, texture_info(*texture, place + ".texture"));
     const Json* type = member(json, "type");
     entry.type = type == nullptr ? "High_Resolution" : text_of(type);
@@ -428,8 +423,7 @@ class ImageLoader {
       if (mode == nullptr) continue;
       const bool known = mode->is_number_unsigned() && (*mode == repeat || *mode == clamp || *mode == mirror);
       if (!known)
-        return malformed_material("is no way to wrap", fmt::format("samplers[{}].{}", index, key),
-                                  "10497, 33071, 33648");
+        return malformed("is no way to wrap", fmt::format("samplers[{}].{}", index, key), "10497, 33071, 33648");
       modes[axis] = mode->get<int>();
     }
     if (modes[0] == modes[1] && modes[0] != mirror) return modes[0] == clamp ? Wrap::clamp : Wrap::repeat;
@@ -458,7 +452,7 @@ class ImageLoader {
       if (!found) return std::move(found).error();
       bytes = *found;
     } else {
-      return malformed_material("names no data", place, "a uri or a bufferView");
+      return malformed("names no data", place, "a uri or a bufferView");
     }
     Result<Image> image = read_image_bytes(bytes, name);
     if (!image) {

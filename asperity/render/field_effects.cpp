@@ -10,10 +10,6 @@ namespace asperity {
 
 namespace {
 
-Error bad_effect(std::string message, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(message), {}, std::move(place), std::move(accepted)};
-}
-
 /// Whether the effect is made of the probe's velocity: a resistance, which must not turn into a drive.
 bool resists(FieldEffectKind kind) noexcept {
   return kind == FieldEffectKind::viscosity || kind == FieldEffectKind::pao ||
@@ -54,14 +50,14 @@ Vec3 uncut_force(const FieldEffect& effect, const FieldJet& jet, const Vec3& vel
 }  // namespace
 
 Result<TransferFunction> TransferFunction::build(std::vector<Point> points) {
-  if (points.empty()) return bad_effect("has no point", "transfer", "one point [value, answer] or more");
+  if (points.empty()) return bad_value("has no point", "transfer", "one point [value, answer] or more");
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto place = [i] { return fmt::format("transfer[{}]", i); };
     if (!std::isfinite(points[i].value) || !std::isfinite(points[i].answer))
-      return bad_effect(fmt::format("is ({}, {})", points[i].value, points[i].answer), place(), "two finite numbers");
+      return bad_value(fmt::format("is ({}, {})", points[i].value, points[i].answer), place(), "two finite numbers");
     if (i > 0 && !(points[i].value > points[i - 1].value))
-      return bad_effect(fmt::format("has the value {} after {}", points[i].value, points[i - 1].value), place(),
-                        "values that increase from point to point");
+      return bad_value(fmt::format("has the value {} after {}", points[i].value, points[i - 1].value), place(),
+                       "values that increase from point to point");
   }
   TransferFunction function;
   function.points_ = std::move(points);
@@ -84,29 +80,29 @@ std::span<const std::string> field_effect_names() {
 }
 
 Status validate(const FieldEffect& effect) {
-  if (effect.field == nullptr) return bad_effect("is missing", "field", "a scalar field");
+  if (effect.field == nullptr) return bad_value("is missing", "field", "a scalar field");
   if (static_cast<std::size_t>(effect.kind) >= field_effect_names().size())
-    return bad_effect(fmt::format("is {}", static_cast<int>(effect.kind)), "kind", name_list<FieldEffectKind>());
+    return bad_value(fmt::format("is {}", static_cast<int>(effect.kind)), "kind", name_list<FieldEffectKind>());
   if (effect.transfer.points().empty())
-    return bad_effect("has no point", "transfer", "one point [value, answer] or more");
+    return bad_value("has no point", "transfer", "one point [value, answer] or more");
   for (std::size_t i = 0; i < effect.transfer.points().size(); ++i) {
     const double answer = effect.transfer.points()[i].answer;
     if (resists(effect.kind) && answer < 0.0)
-      return bad_effect(fmt::format("answers {}, which would drive the hand", answer), fmt::format("transfer[{}]", i),
-                        "a viscosity of 0 or more (N·s/m)");
+      return bad_value(fmt::format("answers {}, which would drive the hand", answer), fmt::format("transfer[{}]", i),
+                       "a viscosity of 0 or more (N·s/m)");
   }
   const double length = effect.direction.norm();
   if (!effect.direction.allFinite() || std::abs(length - 1.0) > 1e-6)
-    return bad_effect(fmt::format("has the length {}", length), "direction", "a unit vector");
-  if (!std::isfinite(effect.value)) return bad_effect(fmt::format("is {}", effect.value), "value", "a finite number");
+    return bad_value(fmt::format("has the length {}", length), "direction", "a unit vector");
+  if (!std::isfinite(effect.value)) return bad_value(fmt::format("is {}", effect.value), "value", "a finite number");
   if (!(effect.largest_force > 0.0) || !std::isfinite(effect.largest_force))
-    return bad_effect(fmt::format("is {}", effect.largest_force), "largest_force", "a force above 0 (N)");
+    return bad_value(fmt::format("is {}", effect.largest_force), "largest_force", "a force above 0 (N)");
   if (effect.formulation == Formulation::literal && effect.kind != FieldEffectKind::pao)
-    return bad_effect("is literal", "formulation", "\"consistent\"; only pao has a literal form");
+    return bad_value("is literal", "formulation", "\"consistent\"; only pao has a literal form");
   const Pose& pose = effect.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
       std::abs(pose.orientation.norm() - 1.0) > 1e-6)
-    return bad_effect("is no rigid placement", "world_from_object", "a finite position and a unit quaternion");
+    return bad_value("is no rigid placement", "world_from_object", "a finite position and a unit quaternion");
   return success();
 }
 

@@ -12,17 +12,12 @@ namespace asperity {
 
 namespace {
 
-Error bad_features(std::string place, std::string what, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Status check_lay(const FrictionLay& lay) {
   const auto share = [](double value) { return value >= 0.0 && value <= 1.0; };
-  if (!share(lay.still_ratio)) return bad_features("still_ratio", fmt::format("is {}", lay.still_ratio), "0 to 1");
-  if (!share(lay.sliding_ratio))
-    return bad_features("sliding_ratio", fmt::format("is {}", lay.sliding_ratio), "0 to 1");
+  if (!share(lay.still_ratio)) return bad_value(fmt::format("is {}", lay.still_ratio), "still_ratio", "0 to 1");
+  if (!share(lay.sliding_ratio)) return bad_value(fmt::format("is {}", lay.sliding_ratio), "sliding_ratio", "0 to 1");
   if (lay.direction && !std::isfinite(*lay.direction))
-    return bad_features("direction", fmt::format("is {}", *lay.direction), "an angle");
+    return bad_value(fmt::format("is {}", *lay.direction), "direction", "an angle");
   return success();
 }
 
@@ -75,20 +70,19 @@ LayMatrix root(const LayMatrix& square) {
 
 Result<FineFeatures> FineFeatures::build(FineSettings settings) {
   if (settings.texture.size() + settings.micro.size() > most_features) {
-    return bad_features("features", fmt::format("has {} entries", settings.texture.size() + settings.micro.size()),
-                        fmt::format("at most {}", most_features));
+    return bad_value(fmt::format("has {} entries", settings.texture.size() + settings.micro.size()), "features",
+                     fmt::format("at most {}", most_features));
   }
   if (settings.source == TextureSource::coat && !settings.texture.empty())
-    return bad_features("source", "is the coat, and there are features", "the coat, or features");
+    return bad_value("is the coat, and there are features", "source", "the coat, or features");
   if (auto valid = check_lay(settings.lay); !valid) return std::move(valid).error().at("lay");
   if (!(settings.resolution >= 0.0 && std::isfinite(settings.resolution)))
-    return bad_features("resolution", fmt::format("is {}", settings.resolution), "a length of 0 or more (m)");
+    return bad_value(fmt::format("is {}", settings.resolution), "resolution", "a length of 0 or more (m)");
   const FrictionMap& map = settings.friction_map;
   if (map.factors != nullptr) {
     if (!(map.tile.minCoeff() > 0.0 && map.tile.allFinite()))
-      return bad_features("friction_map.tile", fmt::format("is {} x {} m", map.tile.x(), map.tile.y()),
-                          "lengths above 0");
-    if (map.factors->highest() <= 0.0) return bad_features("friction_map", "is 0 throughout", "factors of 0 or more");
+      return bad_value(fmt::format("is {} x {} m", map.tile.x(), map.tile.y()), "friction_map.tile", "lengths above 0");
+    if (map.factors->highest() <= 0.0) return bad_value("is 0 throughout", "friction_map", "factors of 0 or more");
   }
   FineFeatures fine;
   for (const SurfaceFeature& feature : settings.texture) {
@@ -98,10 +92,10 @@ Result<FineFeatures> FineFeatures::build(FineSettings settings) {
     const FeatureKind kind = feature.spec().kind;
     // Bounds of what is not a formula of slopes are far from what it reaches.
     if (kind == FeatureKind::noise || kind == FeatureKind::map || fine.steepness_.back() <= most_slope) continue;
-    return bad_features("features",
-                        fmt::format("has a {} whose slopes reach {:.2g}", feature_name(kind), fine.steepness_.back()),
-                        fmt::format("slopes up to {:g}: an amplitude of at most {}", most_slope,
-                                    format_length(feature.spec().amplitude * most_slope / fine.steepness_.back())));
+    return bad_value(fmt::format("has a {} whose slopes reach {:.2g}", feature_name(kind), fine.steepness_.back()),
+                     "features",
+                     fmt::format("slopes up to {:g}: an amplitude of at most {}", most_slope,
+                                 format_length(feature.spec().amplitude * most_slope / fine.steepness_.back())));
   }
   LayMatrix squares;
   for (const SurfaceFeature& feature : settings.micro)

@@ -55,10 +55,6 @@ std::string at(const Vec3& p) {
   return fmt::format("({:.4g}, {:.4g}, {:.4g}) m", p.x(), p.y(), p.z());
 }
 
-Error wrong(const char* what, std::string is, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(is), {}, what, std::move(accepted)};
-}
-
 }  // namespace
 
 Result<CustomSurface> CustomSurface::build(std::shared_ptr<const void> field, std::size_t bytes,
@@ -74,13 +70,13 @@ Result<CustomSurface> CustomSurface::build(std::shared_ptr<const void> field, st
   constexpr double largest = 1e5;
   if (!(box.lower.allFinite() && box.upper.allFinite() && (box.extent().array() > 0.0).all() && diagonal < largest &&
         box.lower.cwiseAbs().maxCoeff() < largest))
-    return wrong("bounds", "is no box", "a finite lower corner below the upper one (m), within 100 km");
+    return bad_value("is no box", "bounds", "a finite lower corner below the upper one (m), within 100 km");
   if (!(facts.lipschitz > 0.0 && std::isfinite(facts.lipschitz)))
-    return wrong("lipschitz", fmt::format("is {}", facts.lipschitz),
-                 "above 0: the largest change of the value by metre");
-  if (!(facts.bend > 0.0)) return wrong("bend", fmt::format("is {}", facts.bend), "above 0 (1/m)");
+    return bad_value(fmt::format("is {}", facts.lipschitz), "lipschitz",
+                     "above 0: the largest change of the value by metre");
+  if (!(facts.bend > 0.0)) return bad_value(fmt::format("is {}", facts.bend), "bend", "above 0 (1/m)");
   if (!(facts.grain >= 0.0 && std::isfinite(facts.grain)))
-    return wrong("grain", fmt::format("is {}", facts.grain), "a length above 0 (m), or 0 for a default");
+    return bad_value(fmt::format("is {}", facts.grain), "grain", "a length above 0 (m), or 0 for a default");
   if (facts.grain == 0.0) surface.facts_.grain = 0.01 * diagonal;
   surface.skin_ = std::min(1e-6 * diagonal, 1e-4 * surface.facts_.grain);
   surface.identity_ = next_identity();
@@ -104,20 +100,21 @@ Status CustomSurface::measure() const {
     const FieldSample ahead = eval(p + apart * direction);
     const FieldSample behind = eval(p - apart * direction);
     if (!std::isfinite(here.value) || !std::isfinite(ahead.value) || !std::isfinite(behind.value))
-      return wrong("eval", fmt::format("answers a value that is not finite at {}", at(p)), "finite values in the box");
+      return bad_value(fmt::format("answers a value that is not finite at {}", at(p)), "eval",
+                       "finite values in the box");
     const double slope = (ahead.value - behind.value) / (2.0 * apart);
     const double rounding = 1e-12 * (std::abs(here.value) + lipschitz * box.diagonal()) / apart;
     const double steepest =
         std::max(std::abs(slope) - rounding, here.gradient.allFinite() ? here.gradient.norm() : 0.0);
     if (steepest > lipschitz * counted)
-      return wrong("lipschitz",
-                   fmt::format("is {:.6g}, and at {} the value changes by {:.6g} a metre", lipschitz, at(p), steepest),
-                   "the largest change of the value by metre: searches would pass through the surface");
+      return bad_value(
+          fmt::format("is {:.6g}, and at {} the value changes by {:.6g} a metre", lipschitz, at(p), steepest),
+          "lipschitz", "the largest change of the value by metre: searches would pass through the surface");
     if (i > 0 && std::abs(here.value - value_before) > lipschitz * counted * (p - before).norm())
-      return wrong("lipschitz",
-                   fmt::format("is {:.6g}, and between {} and {} the value changes by {:.6g} a metre", lipschitz,
-                               at(before), at(p), std::abs(here.value - value_before) / (p - before).norm()),
-                   "the largest change of the value by metre: searches would pass through the surface");
+      return bad_value(fmt::format("is {:.6g}, and between {} and {} the value changes by {:.6g} a metre", lipschitz,
+                                   at(before), at(p), std::abs(here.value - value_before) / (p - before).norm()),
+                       "lipschitz",
+                       "the largest change of the value by metre: searches would pass through the surface");
     constexpr double share = 0.02;
     if (!(std::abs(here.gradient.dot(direction) - slope) <= share * lipschitz + rounding)) {
       ++bad_gradients;
@@ -126,10 +123,9 @@ Status CustomSurface::measure() const {
     const bool bends_here = facts_.sides == Sides::both || behind.value > 0.0;
     if (bends_here && !has_folds() && here.value > 0.0 &&
         (ahead.gradient - behind.gradient).norm() > 2.0 * apart * facts_.bend * 1.01 + 1e-9 * lipschitz)
-      return wrong("bend",
-                   fmt::format("is {:.6g}, and at {} the gradient changes by {:.6g} a metre", facts_.bend, at(p),
-                               (ahead.gradient - behind.gradient).norm() / (2.0 * apart)),
-                   "the largest change of the gradient by metre, or none where there are edges");
+      return bad_value(fmt::format("is {:.6g}, and at {} the gradient changes by {:.6g} a metre", facts_.bend, at(p),
+                                   (ahead.gradient - behind.gradient).norm() / (2.0 * apart)),
+                       "bend", "the largest change of the gradient by metre, or none where there are edges");
     Vec3 q = p;
     any = any || (land(q) && inside(box.grown(skin_), q));
     before = p;
@@ -137,9 +133,9 @@ Status CustomSurface::measure() const {
   }
   // Edges and centres have no gradient; they are met seldom.
   if (bad_gradients > most_samples / 20)
-    return wrong("eval", fmt::format("answers a gradient that is not the value's, at {} for one", at(bad_place)),
-                 "value and gradient of one function");
-  if (!any) return wrong("bounds", "holds no point where the value is 0", "a box around the surface (m)");
+    return bad_value(fmt::format("answers a gradient that is not the value's, at {} for one", at(bad_place)), "eval",
+                     "value and gradient of one function");
+  if (!any) return bad_value("holds no point where the value is 0", "bounds", "a box around the surface (m)");
   return success();
 }
 

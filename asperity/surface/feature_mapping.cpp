@@ -23,29 +23,25 @@ constexpr double on_axis = 1e-12;
 // Share of a wavelength by which the pattern may miss itself where it comes back.
 constexpr double seam_tolerance = 1e-4;
 
-Error refusal(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 std::string shown(const Vec3& v) {
   return fmt::format("is {:.6g}, {:.6g}, {:.6g}", v.x(), v.y(), v.z());
 }
 
 Status check_mapping_length(double value, const char* place) {
   if (value > 0.0 && value <= longest) return success();
-  return refusal(fmt::format("is {:.6g} m", value), place, fmt::format("a length above 0, at most {:g} m", longest));
+  return bad_value(fmt::format("is {:.6g} m", value), place, fmt::format("a length above 0, at most {:g} m", longest));
 }
 
 Status check_frame(const FeatureMappingSettings& settings) {
   constexpr double rounding = 1e-6;
   if (!(settings.origin.norm() <= 1e3))
-    return refusal(shown(settings.origin) + " m", "origin", "a place within 1000 m");
+    return bad_value(shown(settings.origin) + " m", "origin", "a place within 1000 m");
   if (!(std::abs(settings.axis.norm() - 1.0) <= rounding))
-    return refusal(shown(settings.axis), "axis", "a vector of length 1");
+    return bad_value(shown(settings.axis), "axis", "a vector of length 1");
   if (!(std::abs(settings.reference.norm() - 1.0) <= rounding))
-    return refusal(shown(settings.reference), "reference", "a vector of length 1");
+    return bad_value(shown(settings.reference), "reference", "a vector of length 1");
   if (!(std::abs(settings.reference.dot(settings.axis)) <= rounding))
-    return refusal(shown(settings.reference), "reference", "a vector at right angles to the axis");
+    return bad_value(shown(settings.reference), "reference", "a vector at right angles to the axis");
   return success();
 }
 

@@ -29,10 +29,6 @@ struct Layout {
   [[nodiscard]] int height() const { return rows * tile; }
 };
 
-Error bake_error(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 }  // namespace
 
 std::ptrdiff_t nearest_texel_within(const AtlasTexel& texel, double border, int texels) noexcept {
@@ -71,7 +67,7 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, in
 
 Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& heights,
                                 const Progress& progress) {
-  if (texels < 2) return bake_error(fmt::format("is {}", texels), "texels", "2 texels an edge or more");
+  if (texels < 2) return bad_value(fmt::format("is {}", texels), "texels", "2 texels an edge or more");
   const std::size_t faces = mesh.triangles().size();
   const Layout layout(faces, texels);
   if (static_cast<double>(layout.width()) * layout.height() > static_cast<double>(max_pixels)) {
@@ -123,8 +119,8 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const Texe
                                -onward * atlas.width};
         const double height = heights(texel);
         if (!std::isfinite(height)) {
-          return bake_error(fmt::format("the ray from barycentric ({:.3g}, {:.3g}) meets nothing", u, v),
-                            fmt::format("face {}", face), "a surface that every ray of the shell meets");
+          return bad_value(fmt::format("the ray from barycentric ({:.3g}, {:.3g}) meets nothing", u, v),
+                           fmt::format("face {}", face), "a surface that every ray of the shell meets");
         }
         atlas.heights[texel.index] = static_cast<float>(height);
       }

@@ -18,24 +18,20 @@ constexpr double baked_border = 3.2;
 constexpr int most_search_steps = 4096;
 constexpr std::size_t most_named_faces = 8;
 
-Error formula_error(std::string what, std::string place, std::string accepted) {
-  return Error{ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Status validate_bake(const SignedFormula& formula, const FormulaBakeSettings& settings) {
-  if (!formula) return formula_error("is empty", "formula", "a function of a place");
+  if (!formula) return bad_value("is empty", "formula", "a function of a place");
   if (!(std::isfinite(settings.lowest) && settings.lowest <= 0.0)) {
-    return formula_error(fmt::format("is {:g} m", settings.lowest), "lowest", "a length of 0 m or below");
+    return bad_value(fmt::format("is {:g} m", settings.lowest), "lowest", "a length of 0 m or below");
   }
   if (!(std::isfinite(settings.highest) && settings.highest >= 0.0 && settings.highest > settings.lowest)) {
-    return formula_error(fmt::format("is {:g} m", settings.highest), "highest",
-                         "a length of 0 m or above, and above lowest");
+    return bad_value(fmt::format("is {:g} m", settings.highest), "highest",
+                     "a length of 0 m or above, and above lowest");
   }
   if (!(settings.tolerance > 0.0 && std::isfinite(settings.tolerance))) {
-    return formula_error(fmt::format("is {:g} m", settings.tolerance), "tolerance", "a length above 0 m");
+    return bad_value(fmt::format("is {:g} m", settings.tolerance), "tolerance", "a length above 0 m");
   }
   if (settings.steps < 1 || settings.steps > most_search_steps) {
-    return formula_error(fmt::format("is {}", settings.steps), "steps", fmt::format("1 to {}", most_search_steps));
+    return bad_value(fmt::format("is {}", settings.steps), "steps", fmt::format("1 to {}", most_search_steps));
   }
   return success();
 }
@@ -171,8 +167,8 @@ class FormulaBaker {
     if (ray_.strange()) {
       const Vec3& place = *ray_.strange();
       stranger_ =
-          formula_error(fmt::format("is not finite at ({:.9g}, {:.9g}, {:.9g}) m", place.x(), place.y(), place.z()),
-                        fmt::format("formula over face {}", texel.face), "finite values wherever heights are searched");
+          bad_value(fmt::format("is not finite at ({:.9g}, {:.9g}, {:.9g}) m", place.x(), place.y(), place.z()),
+                    fmt::format("formula over face {}", texel.face), "finite values wherever heights are searched");
       return 0.0;
     }
     if (!std::isfinite(height)) {
@@ -202,7 +198,7 @@ class FormulaBaker {
     std::string accepted = "a range of heights that holds the surface, a base nearer to it, or OnMiss::flat";
     if (2 * report_.turned_texels > report_.missed_texels)
       accepted = "a formula that is above 0 outside, where the mesh's normals point; this one is below 0 there";
-    return formula_error(std::move(what), fmt::format("face {}", first.face), std::move(accepted));
+    return bad_value(std::move(what), fmt::format("face {}", first.face), std::move(accepted));
   }
 
   const TriangleMesh& mesh_;

@@ -7,15 +7,6 @@
 namespace asperity::conversion {
 namespace {
 
-constexpr int sign_side = SparseBlock::side;
-
-/// 21 bits an axis: a cell of a coarse grid.
-std::uint64_t sign_key_of(const std::array<std::int32_t, 3>& at) {
-  std::uint64_t key = 0;
-  for (const std::int32_t a : at) key = key << 21U | static_cast<std::uint64_t>((a + (1 << 20)) & ((1 << 21) - 1));
-  return key;
-}
-
 /// Loose ends near each other: edges along which the triangles' boundary does not cancel.
 struct LooseEnds {
   Vec3 centre = Vec3::Zero();
@@ -52,7 +43,7 @@ std::vector<LooseEnds> loose_ends(const TriangleMesh& mesh, double cell) {
       for (int axis = 0; axis < 3; ++axis)
         at[static_cast<std::size_t>(axis)] =
             static_cast<std::int32_t>(std::floor((middle[axis] - mesh.bounds().lower[axis]) / cell));
-      LooseEnds& ends = cells[sign_key_of(at)];
+      LooseEnds& ends = cells[key_of(at)];
       if (ends.length == 0.0) ends.centre = middle;
       ends.radius = std::max({ends.radius, (a - ends.centre).norm(), (b - ends.centre).norm()});
       ends.length += std::abs(sum) * (b - a).norm();
@@ -145,9 +136,10 @@ class Signs {
   void prepare() {
     const double diagonal = mesh_.bounds().diagonal();
     const std::vector<LooseEnds> ends = loose_ends(mesh_, std::max(4.0 * voxel_, diagonal / 64.0));
-    const double reach = 0.5 * std::sqrt(3.0) * (sign_side + 1) * voxel_;
+    const double reach = 0.5 * std::sqrt(3.0) * (block_side + 1) * voxel_;
     parallel_for(blocks_.size(), shared_out, [&](std::size_t b) {
-      const Vec3 centre = position({static_cast<std::uint32_t>(b), 0}) + Vec3::Constant(0.5 * (sign_side - 1) * voxel_);
+      const Vec3 centre =
+          position({static_cast<std::uint32_t>(b), 0}) + Vec3::Constant(0.5 * (block_side - 1) * voxel_);
       // Away from the triangles the winding number is the solid angle of the chain's span: its gradient is the field
       // of a current along the chain (Biot-Savart), at most length / (4 pi distance^2).
       for (const LooseEnds& loose : ends) {

@@ -17,6 +17,17 @@ namespace asperity::conversion {
 /// Items that a thread takes at a time: blocks and points are not worth one each.
 inline constexpr ParallelSettings shared_out{.grain = 16};
 
+/// Points of a block along an axis.
+inline constexpr int block_side = SparseBlock::side;
+
+/// One number for a place on a grid, 21 bits an axis: within a million of the origin, which the bound on the resolution
+/// keeps blocks to. [build]
+inline std::uint64_t key_of(const std::array<std::int32_t, 3>& at) noexcept {
+  std::uint64_t key = 0;
+  for (const std::int32_t a : at) key = key << 21U | static_cast<std::uint64_t>((a + (1 << 20)) & ((1 << 21) - 1));
+  return key;
+}
+
 /// A stored point of a list of blocks.
 struct Node {
   std::uint32_t block = 0;  ///< no_index: its block is not there

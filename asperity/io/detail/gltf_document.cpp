@@ -103,10 +103,6 @@ bool is_root_key(std::string_view name, GltfParts parts) {
   return false;
 }
 
-Error malformed(std::string what, std::string place, std::string accepted) {
-  return {ErrorCode::file_malformed, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 /// Copies the keys of a table out of the file's JSON and refuses values of another type.
 class JsonCheck {
  public:
@@ -342,6 +338,10 @@ Error too_short(std::size_t wanted, std::string_view what, std::uint64_t has, co
 }
 
 }  // namespace
+
+Error malformed(std::string what, std::string place, std::string accepted) {
+  return {ErrorCode::file_malformed, std::move(what), {}, std::move(place), std::move(accepted)};
+}
 
 Status GltfDocument::read_container(std::string_view bytes) {
   if (!bytes.starts_with("glTF")) {

@@ -19,6 +19,9 @@ inline constexpr int most_texcoords = 8;
 /// What of a file is looked at.
 enum class GltfParts { geometry, geometry_and_materials };
 
+/// The Error of a file that is not the JSON it should be: what is there, where, and what should be. [any]
+Error malformed(std::string what, std::string place, std::string accepted);
+
 /// A glTF file taken apart and checked. Errors carry no file name, their place is the path within the JSON.
 class GltfDocument {
  public:

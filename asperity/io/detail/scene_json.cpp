@@ -23,7 +23,7 @@ std::string line_and_column(std::string_view text, std::size_t byte) {
   return fmt::format("line {}, column {}", line, column);
 }
 
-Error malformed(std::string what, const std::string& name, std::string place, std::string accepted = "JSON") {
+Error malformed_json(std::string what, const std::string& name, std::string place, std::string accepted = "JSON") {
   return Error{ErrorCode::file_malformed, std::move(what), name, std::move(place), std::move(accepted)};
 }
 
@@ -78,15 +78,15 @@ Result<SceneJson> parse_scene_json(std::string_view text, const std::string& nam
   try {
     SceneJson json = SceneJson::parse(text.begin(), text.end(), std::ref(duplicates));
     if (!duplicates.first().empty()) {
-      return malformed(fmt::format("the key \"{}\" is given twice in one object", duplicates.first()), name, {},
-                       "each key once");
+      return malformed_json(fmt::format("the key \"{}\" is given twice in one object", duplicates.first()), name, {},
+                            "each key once");
     }
     return json;
   } catch (const SceneJson::parse_error& failure) {
     const std::size_t byte = failure.byte > 0 ? failure.byte - 1 : 0;
-    return malformed("is not JSON: " + short_message(failure.what()), name, line_and_column(text, byte));
+    return malformed_json("is not JSON: " + short_message(failure.what()), name, line_and_column(text, byte));
   } catch (const std::exception& failure) {
-    return malformed("is not JSON: " + short_message(failure.what()), name, {});
+    return malformed_json("is not JSON: " + short_message(failure.what()), name, {});
   }
 }
 
