@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <iostream>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "apps/asperity/command.h"
 #include "asperity/io/experiment.h"
@@ -26,7 +29,27 @@ std::string text_of(const Vec3& v) {
 struct Comparison {
   std::uint64_t different = 0;
   std::string first;  ///< which tick, and what differs
+  // Of the rendered forces that differ:
+  std::uint64_t rest_over = 0;            ///< by more than `rest_bound` while the probe stood still
+  std::uint64_t sliding_over = 0;         ///< by more than `sliding_bound`
+  double largest = 0.0;                   ///< N
+  std::vector<std::uint64_t> ticks_over;  ///< the ticks beyond the bounds: the first hundred
 };
+
+// What another order of the same arithmetic may change (N), and what counts as standing still between two ticks (m).
+constexpr double rest_bound = 1e-9;
+constexpr double sliding_bound = 1e-6;
+constexpr double still = 1e-9;
+
+void measure(const TraceRecord& recorded, const Vec3& rendered, double moved, Comparison& comparison) {
+  const double difference = (recorded.rendered.wrench.force - rendered).norm();
+  comparison.largest = std::max(comparison.largest, difference);
+  const bool resting = moved < still;
+  if (!(difference > (resting ? rest_bound : sliding_bound))) return;
+  ++(resting ? comparison.rest_over : comparison.sliding_over);
+  constexpr std::size_t most_told = 100;
+  if (comparison.ticks_over.size() < most_told) comparison.ticks_over.push_back(recorded.tick);
+}
 
 void compare_tick(const TraceRecord& recorded, const ForceSample& rendered, const Vec3& commanded,
                   Comparison& comparison) {
@@ -47,14 +70,17 @@ void compare_tick(const TraceRecord& recorded, const ForceSample& rendered, cons
 Result<Comparison> play(const Trace& trace, const Experiment& experiment, const Progress& progress) {
   ASPERITY_TRY(SafetyStage safety, SafetyStage::build(SafetySettings::from_profile(experiment.device)));
   ProxyState state;
+  ProxyCache cache;
   Comparison comparison;
   for (std::size_t i = 0; i < trace.records.size(); ++i) {
     const TraceRecord& record = trace.records[i];
     // What was in memory then is what is felt now.
     state.wanted_level = record.rendered.level;
     ASPERITY_CHECK(fetch_volumes(experiment.scene, state, record.probe));
-    const ForceSample rendered = step(experiment.scene, state, record.probe, record.dt);
+    const ForceSample rendered = step(experiment.scene, state, cache, record.probe, record.dt);
     compare_tick(record, rendered, safety.apply(rendered, record.probe, record.dt).force, comparison);
+    const Vec3& before = trace.records[i == 0 ? 0 : i - 1].probe.pose.position;
+    measure(record, rendered.wrench.force, (record.probe.pose.position - before).norm(), comparison);
     if (progress && i % 1000 == 0)
       progress("replaying", static_cast<double>(i) / static_cast<double>(trace.records.size()));
   }
@@ -84,6 +110,10 @@ Result<int> replay(const std::string& path, const Console& console) {
                        {"ticks", trace.records.size()},
                        {"different", comparison.different},
                        {"first_difference", comparison.first},
+                       {"largest_difference_n", comparison.largest},
+                       {"at_rest_over_1e-9_n", comparison.rest_over},
+                       {"sliding_over_1e-6_n", comparison.sliding_over},
+                       {"ticks_over", comparison.ticks_over},
                        {"force_hash", format_hash(force_hash(trace.records))},
                        {"complete", trace.complete},
                        {"damage", trace.damage}});
