@@ -184,6 +184,7 @@ Result<Outcome> touch(const Options& options, const VolumeFunction& function, co
 
   Walk walk(function, extent, speed);
   ProxyState state;
+  ProxyCache cache;
   Outcome outcome;
   const auto approach_ticks = static_cast<std::size_t>(approach / tick);
   const std::size_t ticks = approach_ticks + static_cast<std::size_t>(options.seconds / tick);
@@ -202,7 +203,7 @@ Result<Outcome> touch(const Options& options, const VolumeFunction& function, co
     const std::size_t waits = waits_so_far();
     const double busy = busy_microseconds();
     const Clock::time_point begin = Clock::now();
-    const ForceSample force = step(scene, state, probe, Seconds(tick));
+    const ForceSample force = step(scene, state, cache, probe, Seconds(tick));
     const Clock::time_point end = Clock::now();
     if (walking) {
       ++outcome.ticks;

@@ -27,13 +27,14 @@ struct Touch {
   Scene scene;
   std::shared_ptr<const Slide> slide;
   ProxyState state = {};
+  ProxyCache cache = {};
   ProbeSample probe = {};
 
   bool tick(std::size_t at) {
     const Vec3 before = probe.pose.position;
     probe.pose.position = slide->probe(at % slide->direction.size(), 0.0);
     probe.twist.linear = (probe.pose.position - before) / tick_seconds;
-    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   }
 };
 
@@ -56,7 +57,7 @@ Result<Touch> touch_of(const Fine& fine, const std::shared_ptr<const MeshSurface
   ASPERITY_TRY(Scene scene, Scene::build({sphere}, 0.0));
   Touch touch{std::move(scene), slide};
   touch.probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(touch.scene, touch.state, touch.probe, Seconds(tick_seconds));
+  step(touch.scene, touch.state, touch.cache, touch.probe, Seconds(tick_seconds));
   return touch;
 }
 

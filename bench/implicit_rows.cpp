@@ -61,12 +61,13 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Sparse
   }
   ASPERITY_TRY(Scene scene, Scene::build({instance}, 0.0));
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.pose.position = 1.1 * sphere_radius * slide->direction.front();
-  step(scene, state, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, probe](std::size_t tick) mutable {
+  step(scene, state, cache, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
     probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   });
 }
 

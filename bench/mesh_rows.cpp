@@ -38,12 +38,13 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSu
   }
   ASPERITY_TRY(Scene scene, Scene::build({sphere}, touch.radius));
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(scene, state, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, touch, state, probe](std::size_t tick) mutable {
+  step(scene, state, cache, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, touch, state, cache, probe](std::size_t tick) mutable {
     probe.pose.position = slide->probe(touch.resting ? 0 : tick, touch.radius);
-    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   });
 }
 

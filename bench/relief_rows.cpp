@@ -76,12 +76,13 @@ Result<Row> step_row(const std::string& name, const SharedRelief& surface, const
   sphere.material.dynamic_friction = 0.2;
   ASPERITY_TRY(Scene scene, Scene::build({sphere}, 0.0));
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(scene, state, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, probe](std::size_t tick) mutable {
+  step(scene, state, cache, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
     probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   });
 }
 

@@ -45,12 +45,13 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Scalar
   }
   ASPERITY_TRY(Scene scene, Scene::build({instance}, 0.0));
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.pose.position = 1.1 * sphere_radius * slide->direction.front();
-  step(scene, state, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, probe](std::size_t tick) mutable {
+  step(scene, state, cache, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
     probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
   });
 }
 
@@ -67,13 +68,14 @@ Row segment_row(const std::shared_ptr<const ScalarField>& field) {
   const double length = 1.2 * field->narrowest_cell();
   return Row("first crossing of 1.2 cells, trilinear",
              [field, length, generator = std::mt19937_64(1), place = Vec3(0.0, 0.0, sphere_radius),
-              hint = std::make_shared<IsoHint>()](std::size_t) mutable {
+              cells = std::make_shared<CellCache>()](std::size_t) mutable {
                std::normal_distribution<double> normal;
                const Vec3 way = Vec3(normal(generator), normal(generator), normal(generator)).normalized() * length;
                IsoView view;
                view.field = field.get();
                view.threshold = sphere_radius;
-               const IsoCrossing crossing = view.first_crossing({place, place + way}, *hint);
+               view.cells = cells.get();
+               const IsoCrossing crossing = view.first_crossing({place, place + way});
                place = (place + way).normalized() * sphere_radius;
                return crossing.t <= 1.0;
              });

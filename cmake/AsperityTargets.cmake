@@ -51,14 +51,18 @@ if(ASPERITY_SANITIZE)
   target_compile_definitions(asperity_build_settings INTERFACE ASPERITY_SANITIZED)
 endif()
 
-# asperity_module(NAME UNITS n [SOURCES files...] DEPENDS modules... LIBRARIES public... PRIVATE private...)
-# A library from every .cpp in the current folder and in its detail/ (or from those given), with the alias asperity::NAME. Headers in detail/
+# asperity_module(NAME UNITS n [SOURCES files...] [FOLDERS folders...] DEPENDS modules... LIBRARIES public... PRIVATE private...)
+# A library from every .cpp in the current folder, in its detail/ and in its FOLDERS (or from those given), with the alias asperity::NAME. Headers in detail/
 # are the module's own: no other module includes them, and they are not installed.
 function(asperity_module name)
-  cmake_parse_arguments(arg "" "UNITS" "SOURCES;DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "" "UNITS" "SOURCES;FOLDERS;DEPENDS;LIBRARIES;PRIVATE" ${ARGN})
   set(sources ${arg_SOURCES})
   if(NOT sources)
-    file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp" "${CMAKE_CURRENT_SOURCE_DIR}/detail/*.cpp")
+    set(places "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+    foreach(folder IN LISTS arg_FOLDERS ITEMS detail)
+      list(APPEND places "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp")
+    endforeach()
+    file(GLOB sources CONFIGURE_DEPENDS ${places})
   endif()
   add_library(asperity_${name} STATIC ${sources})
   add_library(asperity::${name} ALIAS asperity_${name})

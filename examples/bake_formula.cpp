@@ -20,8 +20,9 @@ Status touch() {
   ASPERITY_TRY(const auto relief, wear_baked(baked));
   ASPERITY_TRY(const Scene scene, Scene::build({{.name = "ball", .surface = relief}}));
   ProxyState state;
+  ProxyCache cache;
   for (double z = 50.2e-3; z > 49.15e-3; z -= 2.5e-4) {
-    const ForceSample felt = step(scene, state, {.pose = {.position = {0.0, 0.0, z}}}, Seconds(1e-3));
+    const ForceSample felt = step(scene, state, cache, {.pose = {.position = {0.0, 0.0, z}}}, Seconds(1e-3));
     std::printf("%6.2f mm %8.3f N\n", 1e3 * z, felt.wrench.force.z());
   }
   return success();

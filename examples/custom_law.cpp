@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "apps/asperity/program.h"
-#include "asperity/render/custom_law.h"
+#include "asperity/render/law_registry.h"
 
 using namespace asperity;
 

@@ -13,8 +13,9 @@ int main() {
   const auto relief = make_relief(*sheet, Mesostructure::build(rings, Vec2(0.1, 0.1)).value()).value();
   const Scene scene = Scene::build({{.name = "sheet", .surface = relief}}).value();
   ProxyState state;
+  ProxyCache cache;
   for (double z = 1.1e-3; z > -1e-3; z -= 2e-4) {
-    const ForceSample felt = step(scene, state, {.pose = {.position = {0.0, 0.0, z}}}, Seconds(1e-3));
+    const ForceSample felt = step(scene, state, cache, {.pose = {.position = {0.0, 0.0, z}}}, Seconds(1e-3));
     std::printf("%5.1f mm %8.3f N\n", 1e3 * z, felt.wrench.force.z());
   }
 }

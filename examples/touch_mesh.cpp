@@ -13,9 +13,10 @@ Status touch(const char* file) {
   ASPERITY_TRY(const Scene scene, Scene::build({{.name = "part", .surface = part}}));
   const Vec3 top(part->bounds().centre().x(), part->bounds().centre().y(), part->bounds().upper.z());
   ProxyState state;
+  ProxyCache cache;
   for (double height = 1e-3; height > -1.1e-3; height -= 5e-4) {
     const Vec3 probe = top + Vec3(0.0, 0.0, height);
-    const ForceSample felt = step(scene, state, {.pose = {.position = probe}}, Seconds(1e-3));
+    const ForceSample felt = step(scene, state, cache, {.pose = {.position = probe}}, Seconds(1e-3));
     std::printf("%5.1f mm %8.3f N\n", 1e3 * height, felt.wrench.force.z());
   }
   return success();

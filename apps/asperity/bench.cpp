@@ -49,9 +49,9 @@ class CacheSweep {
   std::vector<unsigned char> bytes_;
 };
 
-double timed_step(const Experiment& experiment, ProxyState& state, const TraceRecord& tick) {
+double timed_step(const Experiment& experiment, ProxyState& state, ProxyCache& cache, const TraceRecord& tick) {
   const auto begin = std::chrono::steady_clock::now();
-  const ForceSample sample = step(experiment.scene, state, tick.probe, tick.dt);
+  const ForceSample sample = step(experiment.scene, state, cache, tick.probe, tick.dt);
   const double seconds = Seconds(std::chrono::steady_clock::now() - begin).count();
   // Reading the answer keeps the call alive.
   return sample.wrench.force.x() < infinity ? seconds : 0.0;
@@ -61,9 +61,10 @@ Latency measure_warm(const Experiment& experiment, const std::vector<TraceRecord
   std::vector<double> seconds;
   seconds.reserve(static_cast<std::size_t>(ticks));
   ProxyState state;
+  ProxyCache cache;
   for (std::size_t i = 0; seconds.size() < static_cast<std::size_t>(ticks); i = (i + 1) % records.size()) {
     if (i == 0) state = ProxyState{};
-    seconds.push_back(timed_step(experiment, state, records[i]));
+    seconds.push_back(timed_step(experiment, state, cache, records[i]));
   }
   return latency_of(std::move(seconds));
 }
@@ -74,14 +75,15 @@ Latency measure_cold(const Experiment& experiment, const std::vector<TraceRecord
   std::vector<double> seconds;
   CacheSweep sweep;
   ProxyState state;
+  ProxyCache cache;
   const std::size_t stride = std::max<std::size_t>(1, records.size() / static_cast<std::size_t>(ticks));
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (i % stride == stride - 1) {
       sweep.run();
-      seconds.push_back(timed_step(experiment, state, records[i]));
+      seconds.push_back(timed_step(experiment, state, cache, records[i]));
       if (progress) progress("cold ticks", static_cast<double>(i) / static_cast<double>(records.size()));
     } else {
-      timed_step(experiment, state, records[i]);
+      timed_step(experiment, state, cache, records[i]);
     }
   }
   if (sweep.sum() == 0U) seconds.push_back(0.0);

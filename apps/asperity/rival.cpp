@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "asperity/core/suggest.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/study/follow.h"
 
 namespace asperity::program {

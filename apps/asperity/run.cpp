@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "asperity/io/trace_file.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"
 
 namespace asperity::program {
@@ -28,6 +29,7 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
   RunResult result;
   result.records.reserve(settings.expected_ticks);
   ProxyState state;
+  ProxyCache cache;
   Status written = success();
   // Not in real time: what a tick needs of a volume larger than memory is waited for.
   Status fetched = success();
@@ -38,7 +40,7 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
   };
   const auto render = [&](const ProbeSample& sample, Seconds dt) {
     if (fetched.ok()) fetched = fetch_volumes(experiment.scene, state, sample);
-    return step(experiment.scene, state, sample, dt);
+    return step(experiment.scene, state, cache, sample, dt);
   };
   result.summary = run_session(render, probe, safety, settings, keep, progress);
   ASPERITY_CHECK(std::move(written));

@@ -3,8 +3,10 @@
 
 #include <cstdint>
 
+#include "asperity/core/fixed_vector.h"
 #include "asperity/core/frames.h"
 #include "asperity/core/names.h"
+#include "asperity/core/place.h"
 #include "asperity/core/units.h"
 
 namespace asperity {
@@ -84,6 +86,8 @@ struct ContactSummary {
   Vec3 normal = Vec3::Zero();         ///< unit, outward from what is touched (world); zero without contact
   double penetration = 0.0;           ///< m, along `normal`
   double height = 0.0;                ///< relief height under the probe (m); 0 without a coat
+  /// Where that instance is touched, at most three planes at once; not recorded in traces.
+  FixedVector<Place, 3> places = {};
 };
 
 /// Parts of a force (heterogeneous-features-2008, eq. 1); what remains of the whole is constraint. World frame (N).

@@ -20,7 +20,7 @@ struct Foot {
   Vec3 normal = Vec3::Zero();        ///< unit, from the surface towards the query point; the face's own inside a face
   double distance = infinity;        ///< from the query point (m), not negative
   std::uint32_t element = no_index;  ///< face, cell or patch; no_index: nothing there
-  Vec3 barycentric = Vec3::Zero();   ///< within `element`, where it is a triangle
+  Vec3 at = Vec3::Zero();            ///< within `element`: as Place::at
   [[nodiscard]] bool found() const noexcept { return element != no_index; }
 };
 
@@ -29,6 +29,8 @@ struct SweptHit {
   bool hit = false;
   double t = 1.0;  ///< fraction of the motion at which it happens
   Foot contact;    ///< valid when hit
+  /// Of smooth surfaces: 1 when they are met from the front, -1 from the back; `contact.normal` is on that side.
+  double side = 1.0;
 };
 
 /// More planes than three are never active at once; the others are kept until the solve has chosen.

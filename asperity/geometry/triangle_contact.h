@@ -40,7 +40,7 @@ inline Foot triangle_foot(std::uint32_t element, const TrianglePoint& at, const 
   foot.point = at.point;
   foot.distance = std::sqrt(at.squared_distance);
   foot.element = element;
-  foot.barycentric = at.barycentric;
+  foot.at = at.barycentric;
   const Vec3 offset = p - at.point;
   foot.normal = offset.dot(face_normal) < 0.0 ? Vec3(-face_normal) : face_normal;
   if (at.barycentric.minCoeff() > 0.0 || foot.distance <= tolerance.rounding) return foot;
@@ -111,7 +111,7 @@ inline void add_triangle_contact(std::uint32_t element, const Vec3& a, const Vec
 template <class Corners>
 void settle_edge_contacts(const Vec3& position, const ContactTolerance& tolerance, const Corners& corners,
                           ContactSet& contacts) noexcept {
-  const auto inside_face = [](const Foot& foot) { return foot.barycentric.minCoeff() > 0.0; };
+  const auto inside_face = [](const Foot& foot) { return foot.at.minCoeff() > 0.0; };
   for (std::size_t i = contacts.size(); contacts.size() > 1 && i-- > 0;) {
     Foot& edge = contacts[i];
     if (inside_face(edge)) continue;

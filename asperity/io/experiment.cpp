@@ -46,34 +46,25 @@ Box base_bounds(std::span<const Instance> instances) {
 
 /// The nearest point of what carries a surface, its base mesh or the isosurface, with its outward normal. A volume in
 /// bricks is asked on its coarsest level, the one that is always in memory.
-SurfacePoint nearest_on(const Surface& surface, const Vec3& p, Hint& hint, double& distance) {
+SurfacePoint nearest_on(const Surface& surface, const Vec3& p, SurfaceCache& cache, double& distance) {
   SurfacePoint nearest{p, Vec3::Zero()};
+  const auto ask = [&](const auto& view) {
+    const Foot foot = view.nearest(p, infinity);
+    distance = foot.distance;
+    if (foot.found()) nearest = {foot.point, view.front(foot)};
+  };
   if (const ParametricSurface* parametric = parametric_of(surface)) {
-    const Foot foot = parametric->closest(p, infinity, hint);
-    distance = foot.distance;
-    if (foot.found()) nearest = {foot.point, parametric->normal(parametric->jet(hint.parametric.uv))};
-    return nearest;
+    ask(parametric->view());
+  } else if (const CustomSurface* custom = custom_of(surface)) {
+    ask(custom->view());
+  } else if (const MeshSurface* base = base_of(surface)) {
+    ask(base->view(cache));
+  } else {
+    const IsoSurface& iso = *iso_of(surface);
+    iso.field().enter();
+    ask(iso.view(cache.cells, iso.field().levels() - 1, iso.threshold()));
+    iso.field().leave();
   }
-  if (const CustomSurface* custom = custom_of(surface)) {
-    const Foot foot = custom->closest(p, infinity, hint);
-    distance = foot.distance;
-    if (foot.found()) nearest = {foot.point, custom->outward(foot.point)};
-    return nearest;
-  }
-  if (base_of(surface) == nullptr) {
-    const IsoSurface* iso = iso_of(surface);
-    const IsoView view = iso->view(iso->field().levels() - 1);
-    iso->field().enter();
-    const Foot foot = view.closest(p, infinity, hint.iso);
-    distance = foot.distance;
-    if (foot.found()) nearest = {foot.point, view.outward(foot.point, hint.iso)};
-    iso->field().leave();
-    return nearest;
-  }
-  const MeshSurface& base = *base_of(surface);
-  const Foot foot = base.closest(p, infinity, hint);
-  distance = foot.distance;
-  if (foot.found()) nearest = {foot.point, pseudonormal(base.mesh(), foot.element, foot.barycentric)};
   return nearest;
 }
 
@@ -128,7 +119,7 @@ SurfaceProjector projector(const Scene& scene) {
   std::vector<Surface> carriers;
   for (const Instance& instance : scene.instances()) carriers.push_back(carrier_of(instance.surface));
   return [&scene, carriers = std::move(carriers),
-          hints = std::vector<Hint>(scene.instances().size())](const Vec3& hand) mutable {
+          caches = std::vector<SurfaceCache>(scene.instances().size())](const Vec3& hand) mutable {
     const View& view = scene.settings().view;
     const Vec3 p = view.identity() ? hand : view.to_scene(hand);
     SurfacePoint best{p, Vec3::Zero()};
@@ -137,7 +128,7 @@ SurfaceProjector projector(const Scene& scene) {
       const Instance& instance = scene.instances()[i];
       double distance = infinity;
       const SurfacePoint found =
-          nearest_on(carriers[i], instance.world_from_object.apply_inverse(p), hints[i], distance);
+          nearest_on(carriers[i], instance.world_from_object.apply_inverse(p), caches[i], distance);
       if (!(distance < nearest)) continue;
       nearest = distance;
       best.point = instance.world_from_object.apply(found.point);

@@ -9,6 +9,7 @@
 #include "asperity/field/mesh_conversion.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/sparse_io.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/surface/implicit_texture.h"
 
 namespace asperity {

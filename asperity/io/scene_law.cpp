@@ -8,7 +8,7 @@
 #include "asperity/io/detail/scene_custom.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/image_io.h"
-#include "asperity/render/custom_law.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/surface/tangents.h"
+
 namespace asperity {
 namespace {
 
@@ -42,14 +44,16 @@ class Places {
     if (!by_coordinates()) {
       mapping_.map(point, places_);
     } else if (const ParametricSurface* surface = parametric_of(instance_.surface)) {
-      if (!surface->closest(point, infinity, hint_).found()) return places_;
+      const Foot foot = surface->view().nearest(point, infinity);
+      if (!foot.found()) return places_;
+      const ParametricJet jet = surface->jet(foot.at.head<2>());
       MappedPlace place;
-      ParametricSurface::parameter_gradients(surface->jet(hint_.parametric.uv), place.du, place.dv);
+      parameter_gradients(jet.u, jet.v, place.du, place.dv);
       place.du *= mapping_.settings().tile.x();
       place.dv *= mapping_.settings().tile.y();
       places_.push_back(place);
     } else if (const MeshSurface* mesh = coordinates()) {
-      const Foot foot = mesh->closest(point, infinity, hint_);
+      const Foot foot = mesh->view(cache_).nearest(point, infinity);
       if (foot.found()) places_.push_back(mapping_.on_mesh(mesh->mesh(), foot.element, point));
     }
     return places_;
@@ -59,7 +63,7 @@ class Places {
   const Instance& instance_;
   const FeatureMapping& mapping_;
   const MeshSurface* mesh_;
-  Hint hint_;
+  SurfaceCache cache_;
   MappedPlaces places_;
 };
 

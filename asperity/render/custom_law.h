@@ -2,18 +2,17 @@
 // A force law of one's own: a type with one function, which answers what a probe feels of a surface.
 
 #include <cstring>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "asperity/core/named_numbers.h"
 #include "asperity/core/units.h"
-#include "asperity/render/scene.h"
+#include "asperity/render/felt.h"
+#include "asperity/render/state.h"
 
 namespace asperity {
 
-struct ContactState;
 struct LawForce;
 
 /// What a law of one's own answers, object frame.
@@ -32,22 +31,22 @@ struct CustomForce {
 /// The surface that a law touches, object frame, whatever kind it is. [servo]
 class TouchedSurface {
  public:
-  TouchedSurface(const Instance& instance, ContactState& slot) noexcept : instance_(&instance), slot_(&slot) {}
+  TouchedSurface(const Instance& instance, const FeltView& view) noexcept : instance_(&instance), view_(&view) {}
   /// Signed value and gradient: below 0 inside; a distance on meshes, and to first order elsewhere. [servo]
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
   /// The nearest point within `bound` (m). [servo]
-  [[nodiscard]] Foot closest(const Vec3& p, double bound) const noexcept;
+  [[nodiscard]] Foot nearest(const Vec3& p, double bound) const noexcept;
   [[nodiscard]] Sides sides() const noexcept { return instance_->sides; }
   /// What it is, for laws of one kind of surface. [servo]
   [[nodiscard]] const Surface& surface() const noexcept { return instance_->surface; }
 
  private:
   const Instance* instance_;
-  ContactState* slot_;
+  const FeltView* view_;
 };
 
 /// Largest size of what a law may remember, one for each probe and instance (bytes).
-inline constexpr std::size_t custom_state_size = 64;
+inline constexpr std::size_t custom_state_size = sizeof(CustomMemory::bytes);
 
 /// What a type that is a law may remember: its State, or nothing.
 template <class T>
@@ -86,7 +85,8 @@ concept PlainForceLaw = requires(const T& law, const TouchedSurface& surface, co
 template <class T>
 concept ForceLaw = StatefulForceLaw<T> || PlainForceLaw<T>;
 
-/// A law that a program has added. Immutable; its state is in ContactState. A force that is not finite counts as none.
+/// A law that a program has added. Immutable; its state is in the contact's memory. A force that is not finite counts
+/// as none.
 class CustomLaw {
  public:
   /// Keeps `law` under a name. Errors: those of its validate(). [build]
@@ -134,9 +134,9 @@ class CustomLaw {
     return law;
   }
   [[nodiscard]] bool fits(const Surface& surface) const { return fits_ == nullptr || fits_(law_.get(), surface); }
-  /// Asks it once; `slot` keeps its state, which starts anew with another law. [servo]
-  [[nodiscard]] LawForce force(const Instance& instance, const Material& material, const Vec3& probe,
-                               const Vec3& velocity, Seconds dt, ContactState& slot) const noexcept;
+  /// Asks it once; the contact keeps its state, which starts anew with another law. [servo]
+  [[nodiscard]] LawForce force(const Instance& instance, const FeltView& view, const Material& material,
+                               const Vec3& probe, const Vec3& velocity, Seconds dt, Contact& contact) const noexcept;
 
  private:
   explicit CustomLaw(std::string name);
@@ -150,22 +150,5 @@ class CustomLaw {
   NamedNumbers numbers_;
   std::uint64_t identity_ = 0;
 };
-
-/// Makes a law of the numbers in a scene file.
-using CustomLawFactory = std::function<Result<CustomLaw>(NamedNumbers& numbers)>;
-
-/// Makes a law known to law_by_name, scene files and `compare --laws`. To be called before scenes are read, by one
-/// thread. Errors: bad_value (no plain name, a name that is taken). [build]
-Status register_custom_law(std::string name, CustomLawFactory factory);
-/// The same for a type that is made from its numbers: T(NamedNumbers&). [build]
-template <ForceLaw T>
-Status register_custom_law(const std::string& name) {
-  return register_custom_law(name, [name](NamedNumbers& numbers) { return CustomLaw::build(T(numbers), name); });
-}
-/// Every registered law. [any]
-const std::vector<std::string>& custom_law_names();
-/// A registered law made from `numbers`. Errors: bad_value (unknown), bad_key (a number that it does not read), and the
-/// factory's own. [build]
-Result<Law> make_custom_law(std::string_view name, NamedNumbers numbers);
 
 }  // namespace asperity

@@ -161,22 +161,6 @@ using Law = std::variant<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw
                          GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw,
                          MagneticLaw, NormalPerturbationLaw, std::shared_ptr<const CustomLaw>>;
 
-/// "proxy", "god-object", "force-shading", "height-field", "mesostructure", "generated-geometry", "dense-mesh",
-/// "avila", "cross-uncross", "virtual-contact-point", "magnetic", "normal-perturbation", with "-literal" appended where
-/// a law with two forms has that one; a program's own law by the name that it was given. [any]
-std::string law_name(const Law& law);
-/// The law of that name with default options, built in or registered. Errors: bad_value listing the names. [any]
-Result<Law> law_by_name(std::string_view name);
-/// Every built-in name that law_by_name accepts. [any]
-const std::vector<std::string>& law_names();
-/// Its form, where the law has two; nothing where it has one. [any]
-std::optional<Formulation> formulation_of(const Law& law);
-/// A law of the same kind in that form, with the default options of that form: what the name with or without "-literal"
-/// makes. A law with one form: the law itself. [any]
-Law in_formulation(const Law& law, Formulation formulation);
-/// Errors: bad_value naming the option and what would be accepted. [build]
-Status validate(const Law& law);
-
 /// Whether the law reads a scalar field, and so is felt on isosurfaces alone. [any]
 constexpr bool needs_field(const Law& law) noexcept {
   return std::holds_alternative<AvilaLaw>(law) || std::holds_alternative<CrossUncrossLaw>(law);
@@ -200,6 +184,12 @@ constexpr bool constrains(const Law& law) noexcept {
   return std::holds_alternative<ProxyLaw>(law) || std::holds_alternative<GodObjectLaw>(law) ||
          std::holds_alternative<ForceShadingLaw>(law) || std::holds_alternative<GeneratedGeometryLaw>(law) ||
          std::holds_alternative<DenseMeshLaw>(law);
+}
+
+/// Whether the law feels a surface as its coat displaces it at the moment. [any]
+constexpr bool feels_moment(const Law& law) noexcept {
+  return std::holds_alternative<ProxyLaw>(law) || std::holds_alternative<HeightFieldLaw>(law) ||
+         std::holds_alternative<MesostructureLaw>(law);
 }
 
 /// Whether the law's proxy rests on the displaced surface, smooth or in facets. [any]

@@ -3,23 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
+#include "asperity/core/identity.h"
 #include "asperity/core/units.h"
-#include "asperity/render/custom_law.h"
-#include "asperity/render/detail/coat_material.h"
-#include "asperity/render/fine_contact.h"
+#include "asperity/render/contact/fine.h"
+#include "asperity/render/law_registry.h"
+#include "asperity/render/local_material.h"
 #include "asperity/surface/relief_mesh.h"
 
 namespace asperity {
 
 namespace {
-
-std::uint64_t next_epoch() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
 
 bool needs_coat(const Law& law) {
   return std::holds_alternative<HeightFieldLaw>(law) || std::holds_alternative<MesostructureLaw>(law) ||
@@ -191,65 +186,6 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
 
 }  // namespace
 
-const char* surface_kind(const Surface& surface) {
-  constexpr const char* names[] = {"mesh", "relief", "iso", "implicit", "parametric", "custom"};
-  return names[surface.index()];
-}
-
-Box surface_bounds(const Surface& surface) {
-  return std::visit([](const auto& s) { return s->bounds(); }, surface);
-}
-
-const MeshSurface* base_of(const Surface& surface) noexcept {
-  if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return &(*relief)->base();
-  if (const ImplicitSurface* implicit = implicit_of(surface)) return implicit->mesh();
-  const auto* mesh = std::get_if<std::shared_ptr<const MeshSurface>>(&surface);
-  return mesh != nullptr ? mesh->get() : nullptr;
-}
-
-Material material_at(const ImplicitSurface& surface, const Material& own, const Vec3& p, SparseHint& hint) noexcept {
-  if (!surface.grid().has_materials()) return own;
-  PointMaterial mine;
-  mine.stiffness = static_cast<float>(own.stiffness);
-  mine.damping = static_cast<float>(own.damping);
-  mine.static_friction = static_cast<float>(own.static_friction);
-  mine.dynamic_friction = static_cast<float>(own.dynamic_friction);
-  mine.roughness = 1.0F;
-  const PointMaterial there = surface.grid().material(p, mine, hint);
-  Material out = own;
-  // What is the surface's own stays as exact as it is.
-  const auto take = [](float stored, float rounded, double& value) {
-    if (stored != rounded) value = static_cast<double>(stored);
-  };
-  take(there.stiffness, mine.stiffness, out.stiffness);
-  take(there.damping, mine.damping, out.damping);
-  take(there.static_friction, mine.static_friction, out.static_friction);
-  take(there.dynamic_friction, mine.dynamic_friction, out.dynamic_friction);
-  return out;
-}
-
-Material local_material(const Instance& instance, const Vec3& p, Hint& hint) noexcept {
-  if (const ReliefSurface* relief = relief_of(instance)) {
-    if (relief->coat().materials() == nullptr) return instance.material;
-    return mapped_material(instance, *relief, coat_place(instance, *relief, p, hint));
-  }
-  const ImplicitSurface* implicit = implicit_of(instance.surface);
-  if (implicit == nullptr || !implicit->grid().has_materials()) return instance.material;
-  // A ball's centre, or a probe pressed in, is off the surface by what the potential says.
-  const Potential here = implicit->grid().trilinear(p, hint.sparse);
-  return material_at(*implicit, instance.material, p - here.value * here.gradient, hint.sparse);
-}
-
-bool has_local_material(const Instance& instance) noexcept {
-  if (const ReliefSurface* relief = relief_of(instance)) return relief->coat().materials() != nullptr;
-  const ImplicitSurface* implicit = implicit_of(instance.surface);
-  return implicit != nullptr && implicit->grid().has_materials();
-}
-
-const TriangleMesh& base_mesh(const Surface& surface) {
-  return base_of(surface)->mesh();
-}
-
 namespace {
 
 /// An effect as it stands in a scene that is shown `zoom` times its size.
@@ -348,6 +284,35 @@ Box swept_bounds(const Instance& instance, const Box& local) {
   return way.allFinite() ? all : all.grown(farthest);
 }
 
+/// Whether the surface may move or change its shape under the probe.
+bool changes(const Instance& instance) {
+  if (instance.motion.moves()) return true;
+  if (iso_of(instance.surface) != nullptr) return false;
+  const MeshSurface* base = base_of(instance.surface);
+  if (base != nullptr && base->index().identity() != base->index().lineage()) return true;
+  const ReliefSurface* relief = relief_of(instance);
+  return relief != nullptr && feels_moment(instance.law) && (relief->coat().moves() || relief->coat().levels() > 0);
+}
+
+InstanceFacts facts_of(const Instance& instance) {
+  const Material& material = instance.material;
+  InstanceFacts facts;
+  facts.identity = surface_identity(instance.surface);
+  facts.constrains = constrains(instance.law);
+  facts.smooth = follows_smoothly(instance);
+  facts.facets = std::holds_alternative<GeneratedGeometryLaw>(instance.law);
+  facts.by_planes = facts.facets || std::holds_alternative<DenseMeshLaw>(instance.law);
+  facts.volume = iso_of(instance.surface) != nullptr;
+  facts.varies = has_local_material(instance);
+  facts.holds_friction = proxy_holds_friction(instance);
+  facts.rubs =
+      facts.holds_friction && (facts.varies || material.static_friction > 0.0 || material.dynamic_friction > 0.0);
+  facts.adds_friction = adds_friction(instance);
+  facts.changes = changes(instance);
+  facts.draws = attraction_reach(instance) > 0.0;
+  return facts;
+}
+
 Status check_motion(const Instance& instance, std::size_t index) {
   const Motion& motion = instance.motion;
   const bool finite = motion.velocity.linear.allFinite() && motion.velocity.angular.allFinite() &&
@@ -417,7 +382,8 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
     scene.given_effects_ = scene.felt_effects_;
     for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
   }
-  scene.epoch_ = next_epoch();
+  for (const Instance& instance : scene.felt_) scene.facts_.push_back(facts_of(instance));
+  scene.epoch_ = next_identity();
   return scene;
 }
 

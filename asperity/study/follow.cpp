@@ -60,6 +60,7 @@ Result<std::shared_ptr<const IsoSurface>> wall(double half) {
 /// Whether a law says "contact" on a way that starts `offset` ahead of the surface and ends a tick beyond the layer.
 bool detects(const Scene& scene, const Passage& passage, double offset) {
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.twist.linear = Vec3(passage.speed, 0.0, 0.0);
   const Seconds dt(1.0 / passage.rate);
@@ -67,7 +68,7 @@ bool detects(const Scene& scene, const Passage& passage, double offset) {
     const double x = -offset + k * passage.advance;
     probe.pose.position = Vec3(x, 0.0, 0.0);
     probe.time = k * dt;
-    if (step(scene, state, probe, dt).flags.has(TickFlag::contact)) return true;
+    if (step(scene, state, cache, probe, dt).flags.has(TickFlag::contact)) return true;
     if (x > passage.thickness) return false;
   }
 }
@@ -99,10 +100,10 @@ double largest_deviation(const IsoSurface& surface) noexcept {
   return std::max(std::abs(field.highest() - surface.threshold()), std::abs(surface.threshold() - field.lowest()));
 }
 
-double follow_error(const IsoSurface& surface, const Vec3& p, IsoHint& hint) noexcept {
+double follow_error(const IsoSurface& surface, const Vec3& p, CellCache& cache) noexcept {
   FieldJet jet;
   const double largest = largest_deviation(surface);
-  if (!p.allFinite() || !(largest > 0.0) || !surface.field().contains(p) || !surface.view().sample(p, hint, jet))
+  if (!p.allFinite() || !(largest > 0.0) || !surface.field().contains(p) || !surface.view(cache).sample(p, jet))
     return no_reading;
   // Between its samples a smooth field reaches a little beyond them.
   return std::min(1.0, std::abs(jet.value - surface.threshold()) / largest);

@@ -68,6 +68,7 @@ bool thin(std::vector<Instance>& instances, std::uint32_t stride, LoopRateRow& r
 double median_tick(const Scene& scene, const StrokePath& path, double rate, std::uint64_t ticks) {
   using Clock = std::chrono::steady_clock;
   ProxyState state;
+  ProxyCache cache;
   std::vector<double> times;
   times.reserve(ticks);
   const auto wanted = static_cast<std::uint64_t>(path.duration().count() * rate);
@@ -79,7 +80,7 @@ double median_tick(const Scene& scene, const StrokePath& path, double rate, std:
     probe.twist.linear = pose.velocity;
     probe.time = time;
     const Clock::time_point begin = Clock::now();
-    step(scene, state, probe, Seconds(1.0 / rate));
+    step(scene, state, cache, probe, Seconds(1.0 / rate));
     const double took = Seconds(Clock::now() - begin).count();
     if (time >= path.contact_begin()) times.push_back(took);
   }

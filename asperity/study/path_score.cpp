@@ -15,6 +15,7 @@
 
 #include "asperity/core/units.h"
 #include "asperity/io/recorded_path.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"
 #include "asperity/study/series.h"
 
@@ -196,7 +197,7 @@ class Driver {
       time_ += dt;
       record.probe.time = time_;
       ASPERITY_CHECK(fetch_volumes(scene_, state_, record.probe));
-      record.rendered = step(scene_, state_, record.probe, dt);
+      record.rendered = step(scene_, state_, cache_, record.probe, dt);
     }
     record.commanded = record.rendered.wrench.force;
     place_ = place;
@@ -207,6 +208,7 @@ class Driver {
  private:
   const Scene& scene_;
   ProxyState state_;
+  ProxyCache cache_;
   Vec3 place_ = Vec3::Zero();
   Seconds time_{0.0};
   std::uint64_t tick_ = 0;

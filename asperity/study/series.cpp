@@ -6,7 +6,8 @@
 #include <memory>
 #include <variant>
 
-#include "asperity/render/fine_contact.h"
+#include "asperity/render/fine/texture.h"
+#include "asperity/render/local_material.h"
 #include "asperity/study/follow.h"
 
 namespace asperity {
@@ -34,13 +35,13 @@ struct BasePoint {
   Vec3 slope = Vec3::UnitZ();  // gradient of what a coated surface's zero set is
 };
 
-BasePoint base_point(const MeshSurface& base, const Vec3& p, Hint& hint) {
-  const Foot foot = base.closest(p, infinity, hint);
+BasePoint base_point(const MeshSurface& base, const Vec3& p, SurfaceCache& cache) {
+  const Foot foot = base.view(cache).nearest(p, infinity);
   BasePoint point;
   if (!foot.found()) return point;
   point.face = foot.element;
-  point.barycentric = foot.barycentric;
-  const bool outside = (p - foot.point).dot(pseudonormal(base.mesh(), foot.element, foot.barycentric)) >= 0.0;
+  point.barycentric = foot.at;
+  const bool outside = (p - foot.point).dot(pseudonormal(base.mesh(), foot.element, foot.at)) >= 0.0;
   point.height = outside ? foot.distance : -foot.distance;
   point.up = outside ? foot.normal : Vec3(-foot.normal);
   if (foot.distance == 0.0) point.up = base.mesh().face_normal(foot.element);
@@ -64,7 +65,7 @@ bool step_along(const TriangleMesh& mesh, const Coat& coat, const BasePoint& at,
   return false;
 }
 
-/// Derives one tick after the other; keeps the hints of the queries.
+/// Derives one tick after the other; keeps the caches of the queries.
 class SeriesBuilder {
  public:
   SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks, const SeriesSettings& settings)
@@ -72,7 +73,7 @@ class SeriesBuilder {
         shapes_(settings.exact != nullptr ? *settings.exact : scene),
         edge_reach_(settings.edge_reach),
         path_(path),
-        hints_(std::make_unique<Hint[]>(scene.instances().size())),
+        caches_(std::make_unique<SurfaceCache[]>(scene.instances().size())),
         followed_(followed_instance(scene)) {
     for (auto* column :
          {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.friction, &out_.texture,
@@ -97,7 +98,7 @@ class SeriesBuilder {
     out_.follow.push_back(followed_ == nullptr
                               ? no_sample
                               : follow_error(*iso_of(followed_->surface),
-                                             followed_->world_from_object.apply_inverse(position), follow_hint_));
+                                             followed_->world_from_object.apply_inverse(position), follow_cache_));
     add_energy(tick);
     add_surface(tick, pose.tangent);
     last_ = &tick;
@@ -140,7 +141,7 @@ class SeriesBuilder {
   double stiffness_at(const Instance& instance, const TraceRecord& tick) {
     const ContactSummary& contact = tick.rendered.contact;
     const Vec3 place = pose_of(instance, tick).apply_inverse(contact.point);
-    return local_material(instance, place, hints_[contact.instance]).stiffness;
+    return local_material(instance, {}, place, {}, caches_[contact.instance]).stiffness;
   }
 
   void add_energy(const TraceRecord& tick) {
@@ -172,33 +173,36 @@ class SeriesBuilder {
       return;
     }
     const Surface& shape = shapes_.instances()[tick.rendered.contact.instance].surface;
-    // Judged by the finest level, as it was then.
-    if (const ReliefSurface* relief = relief_of(*instance); relief != nullptr && relief->coat().moves())
-      hints_[tick.rendered.contact.instance].moment.time = tick.probe.time.count();
     if (iso_of(shape) != nullptr && !has_exact_mesh(shape)) {
-      add_isosurface(*instance, *iso_of(shape), tick);
+      const IsoSurface& iso = *iso_of(shape);
+      // The proxy is also held from the inside.
+      add_smooth(*instance, iso.view(caches_[tick.rendered.contact.instance]), iso.bounds(), tick,
+                 constrains(instance->law));
       if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
         add_texture(*instance, *implicit, tick);
       return;
     }
     if (const ParametricSurface* parametric = parametric_of(shape)) {
-      add_parametric(*instance, *parametric, tick);
+      add_smooth(*instance, parametric->view(), parametric->bounds(), tick, true);
       return;
     }
     if (const CustomSurface* custom = custom_of(shape)) {
-      add_custom(*instance, *custom, tick);
+      add_smooth(*instance, custom->view(), custom->bounds(), tick, true);
       return;
     }
     const Pose pose = pose_of(*instance, tick);
     const MeshSurface& base = *base_of(shape);
     const bool proxied = constrains(instance->law);
     const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
-    Hint& hint = hints_[tick.rendered.contact.instance];
-    BasePoint at = base_point(base, felt, hint);
+    SurfaceCache& cache = caches_[tick.rendered.contact.instance];
+    BasePoint at = base_point(base, felt, cache);
     if (at.face == no_index) return;
     const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     out_.near_edge.back() = near_sharp_edge(base, felt - at.height * at.up) ? 1 : 0;
-    in_shell(shape, felt, hint, at);
+    // Judged by the finest level, as it was then.
+    const ReliefSurface* relief = relief_of(*instance);
+    const bool moves = relief != nullptr && relief->coat().moves();
+    in_shell(shape, felt, cache, {0.0, moves ? tick.probe.time.count() : 0.0}, at);
     add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / scene_stiffness(*instance, tick), force);
     add_direction(*instance, shape, at, force);
     if (const Coat* coat = coat_of(shape)) {
@@ -230,23 +234,26 @@ class SeriesBuilder {
     return near;
   }
 
-  void add_isosurface(const Instance& instance, const IsoSurface& surface, const TraceRecord& tick) {
+  /// Heights over a surface without triangles, without its features; on the side touched where it is felt from either.
+  template <class View>
+  void add_smooth(const Instance& instance, const View& view, const Box& bounds, const TraceRecord& tick,
+                  bool either_side) {
     const Pose pose = pose_of(instance, tick);
     const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
-    const bool proxied = constrains(instance.law);
-    const Vec3 felt = proxied ? pose.apply_inverse(tick.rendered.proxy)
-                              : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
-    Hint& hint = hints_[tick.rendered.contact.instance];
-    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
+    const Vec3 felt = constrains(instance.law)
+                          ? pose.apply_inverse(tick.rendered.proxy)
+                          : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
+    const Foot foot = view.nearest(felt, bounds.diagonal());
     if (!foot.found()) return;
-    Vec3 outward = surface.view().outward(foot.point, hint.iso);
-    const double side = (felt - foot.point).dot(outward) < 0.0 ? -1.0 : 1.0;
-    // The proxy is also held from the inside.
-    const bool from_behind = proxied && force.dot(outward) < 0.0;
-    out_.followed.back() = (from_behind ? -side : side) * foot.distance - scene_.probe_radius();
-    out_.relief.back() = 0.0;
-    if (!(force.norm() >= least_force) || outward.isZero()) return;
-    if (from_behind) outward = -outward;
+    const Vec3 front = view.front(foot);
+    const double side = either_side && force.dot(front) < 0.0 ? -1.0 : 1.0;
+    const double over = (felt - foot.point).dot(front) < 0.0 ? -foot.distance : foot.distance;
+    double height = 0.0;
+    if constexpr (std::is_same_v<View, ParametricView>) height = view.spot(foot.at.template head<2>()).height;
+    out_.followed.back() = side * (height + over) - scene_.probe_radius();
+    out_.relief.back() = side * height;
+    if (!(force.norm() >= least_force) || front.isZero()) return;
+    const Vec3 outward = side * front;
     out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
   }
 
@@ -257,10 +264,13 @@ class SeriesBuilder {
     const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     const Vec3 point = pose.apply_inverse(contact.point);
     const Vec3 normal = pose.rotate_inverse(contact.normal);
-    Hint& hint = hints_[contact.instance];
-    const ParametricSurface* parametric = parametric_of(instance.surface);
-    if (parametric != nullptr && !parametric->closest(point, parametric->bounds().diagonal(), hint).found()) return;
-    const TextureShape shape = texture_at(instance, contact.element, point, normal, hint, 0.0);
+    Place place{contact.element};
+    if (const ParametricSurface* parametric = parametric_of(instance.surface)) {
+      const Foot foot = parametric->view().nearest(point, parametric->bounds().diagonal());
+      if (!foot.found()) return;
+      place.at = foot.at;
+    }
+    const TextureShape shape = texture_at(instance, place, point, normal, 0.0);
     const double over = (pose.apply_inverse(in_scene(tick)) - point).dot(normal) - scene_.probe_radius();
     out_.followed.back() = over + force.dot(normal) / scene_stiffness(instance, tick);
     out_.relief.back() = shape.height;
@@ -269,69 +279,32 @@ class SeriesBuilder {
     out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
   }
 
-  /// Heights over a program's own surface, on the side touched.
-  void add_custom(const Instance& instance, const CustomSurface& surface, const TraceRecord& tick) {
-    const Pose pose = pose_of(instance, tick);
-    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
-    const bool proxied = constrains(instance.law);
-    const Vec3 felt = proxied ? pose.apply_inverse(tick.rendered.proxy)
-                              : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
-    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hints_[tick.rendered.contact.instance]);
-    if (!foot.found()) return;
-    const Vec3 front = surface.outward(foot.point);
-    const double side = force.dot(front) < 0.0 ? -1.0 : 1.0;
-    const double over = foot.normal.dot(front) < 0.0 ? -foot.distance : foot.distance;
-    out_.followed.back() = side * over - scene_.probe_radius();
-    out_.relief.back() = 0.0;
-    if (!(force.norm() >= least_force) || front.isZero()) return;
-    const Vec3 reference = side * front;
-    out_.direction_error.back() = std::atan2(reference.cross(force).norm(), reference.dot(force));
-  }
-
-  /// Heights over the surface without its features, on the side touched.
-  void add_parametric(const Instance& instance, const ParametricSurface& surface, const TraceRecord& tick) {
-    const Pose pose = pose_of(instance, tick);
-    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
-    const Vec3 felt = pose.apply_inverse(tick.rendered.proxy);
-    Hint& hint = hints_[tick.rendered.contact.instance];
-    const Foot foot = surface.closest(felt, surface.bounds().diagonal(), hint);
-    if (!foot.found()) return;
-    const ParametricJet jet = surface.jet(hint.parametric.uv);
-    const Vec3 front = surface.normal(jet);
-    const double side = force.dot(front) < 0.0 ? -1.0 : 1.0;
-    const double over = foot.normal.dot(front) < 0.0 ? -foot.distance : foot.distance;
-    out_.followed.back() = side * (jet.height + over) - scene_.probe_radius();
-    out_.relief.back() = side * jet.height;
-    if (!(force.norm() >= least_force)) return;
-    const Vec3 outward = side * front;
-    out_.direction_error.back() = std::atan2(outward.cross(force).norm(), outward.dot(force));
-  }
-
   /// Heights over the mesh where a texture, or an offset, is what is felt.
   void add_texture(const Instance& instance, const ImplicitSurface& surface, const TraceRecord& tick) {
     const Pose pose = pose_of(instance, tick);
     const bool proxied = constrains(instance.law);
     const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
-    Hint& hint = hints_[tick.rendered.contact.instance];
-    const BasePoint at = base_point(*surface.mesh(), felt, hint);
+    SurfaceCache& cache = caches_[tick.rendered.contact.instance];
+    const BasePoint at = base_point(*surface.mesh(), felt, cache);
     if (at.face == no_index) return;
     const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     const double deflection = proxied ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
-    const SweptHit met = surface.segment({base + reach * at.up, base - reach * at.up}, 0.0, Sides::front, hint);
+    const SweptHit met = surface.view(cache).first_touch({base + reach * at.up, base - reach * at.up}, Sides::front);
     out_.followed.back() = met.hit ? at.height + deflection - scene_.probe_radius() : no_sample;
     out_.relief.back() = met.hit ? reach * (1.0 - 2.0 * met.t) : no_sample;
     out_.near_edge.back() = near_sharp_edge(*surface.mesh(), base) ? 1 : 0;
   }
 
   /// On a coat the shell's coordinates say what is under a point, where its shell reaches.
-  static void in_shell(const Surface& shape, const Vec3& felt, Hint& hint, BasePoint& at) {
+  static void in_shell(const Surface& shape, const Vec3& felt, SurfaceCache& cache, const CoatMoment& moment,
+                       BasePoint& at) {
     const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&shape);
     if (relief == nullptr) return;
     ReliefFrame frame;
     ShellPlace place;
-    if ((*relief)->locate(felt, hint, frame, place)) {
+    if ((*relief)->locate(felt, cache, moment, frame, place)) {
       const FieldSample sample = (*relief)->field(frame, place);
       at.face = frame.face;
       at.barycentric = place.barycentric();
@@ -340,7 +313,7 @@ class SeriesBuilder {
       at.slope = sample.gradient;
       return;
     }
-    const CoatSample sample = (*relief)->coat_sample(at.face, at.barycentric, hint.moment);
+    const CoatSample sample = (*relief)->coat_sample(at.face, at.barycentric, moment);
     at.relief = sample.height;
     at.slope = at.up - sample.gradient;
   }
@@ -373,9 +346,9 @@ class SeriesBuilder {
   const Scene& shapes_;  ///< what the run is judged by
   double edge_reach_;
   const StrokePath& path_;
-  std::unique_ptr<Hint[]> hints_;
+  std::unique_ptr<SurfaceCache[]> caches_;
   const Instance* followed_ = nullptr;
-  IsoHint follow_hint_;
+  CellCache follow_cache_;
   RunSeries out_;
   const TraceRecord* last_ = nullptr;
   double work_ = 0.0;

@@ -10,7 +10,7 @@
 #include "asperity/surface/detail/halfspaces.h"
 #include "asperity/surface/detail/relief_weights.h"
 #include "asperity/surface/relief_bake.h"
-#include "asperity/surface/relief_descent.h"
+#include "asperity/surface/relief_view.h"
 
 namespace asperity {
 
@@ -57,7 +57,7 @@ class SurfaceSamples {
         for (int j = 0; i + j <= cuts; ++j) {
           const double u = static_cast<double>(i) / cuts;
           const double v = static_cast<double>(j) / cuts;
-          loose.push_back({surface.point(frame, u, v).position, face, static_cast<float>(u), static_cast<float>(v)});
+          loose.push_back({surface.point(frame, u, v).point, face, static_cast<float>(u), static_cast<float>(v)});
         }
       }
     }
@@ -155,8 +155,8 @@ class Closer {
   [[nodiscard]] double closed_height(const ShellRay& ray, double height, const ReliefPlace& from) {
     const ReliefPoint start = surface_.point(from.frame, from.u, from.v);
     Contacts contacts;
-    contacts.push_back({from, start.position, start.normal(), radius_});
-    const Vec3 centre = start.position + radius_ * start.normal();
+    contacts.push_back({from, start.point, start.front, radius_});
+    const Vec3 centre = start.point + radius_ * start.front;
     if (!add_touched(centre, contacts)) return height;
     double best = settle(ray, height, centre, contacts);
     if (!beyond_wall(ray, height, best)) {
@@ -167,7 +167,7 @@ class Closer {
     }
     const double from_above = settle_from_above(ray, height);
     if (std::isfinite(from_above) && !(from_above >= best)) best = from_above;
-    if (std::isfinite(best) || (last_ - start.position).norm() > 3.0 * radius_) return best;
+    if (std::isfinite(best) || (last_ - start.point).norm() > 3.0 * radius_) return best;
     // From where the ball lay over the texel before.
     contacts.clear();
     best = settle(ray, height, last_, contacts);
@@ -186,16 +186,12 @@ class Closer {
 
   /// Moves a contact to the surface's point that is nearest to the centre, as far as the surface leads there.
   void follow(Contact& contact, const Vec3& centre) const {
-    Descent descent;
-    descent.place = &contact.place;
-    descent.goal = centre;
-    descent.may_leave = false;
-    descent.point = surface_.point(contact.place.frame, contact.place.u, contact.place.v);
-    descend(surface_, descent);
-    contact.point = descent.point.position;
+    ReliefPoint spot = surface_.point(contact.place.frame, contact.place.u, contact.place.v);
+    descend(surface_, contact.place, spot, 1.0, {.point = centre, .may_leave = false});
+    contact.point = spot.point;
     const Vec3 offset = centre - contact.point;
     contact.distance = offset.norm();
-    Vec3 outward = descent.point.normal();
+    Vec3 outward = spot.front;
     const Vec3 barycentric(1.0 - contact.place.u - contact.place.v, contact.place.u, contact.place.v);
     if (barycentric.minCoeff() <= 1e-12)
       outward += pseudonormal(surface_.base().mesh(), contact.place.frame.face, barycentric).normalized();
@@ -260,8 +256,8 @@ class Closer {
     if (!std::isfinite(to)) return true;
     const double scale = ray.direction.norm();
     if ((to - from) * scale <= 0.1 * radius_) return false;
-    Hint hint;
-    return surface_.segment({ray.at(from + 1e-3 * radius_ / scale), ray.at(to)}, 0.0, Sides::both, hint).hit;
+    SurfaceCache cache;
+    return surface_.view(cache).first_touch({ray.at(from + 1e-3 * radius_ / scale), ray.at(to)}, Sides::both).hit;
   }
 
   /// The same from a ball that was let down the ray until it touched.
@@ -384,7 +380,7 @@ bool beyond_convex_edge(const TriangleMesh& mesh, std::uint32_t face, double u, 
   return false;
 }
 
-RayStart start_over(const ReliefSurface& surface, const ReliefFrame& frame, double u, double v, Hint& hint) {
+RayStart start_over(const ReliefSurface& surface, const ReliefFrame& frame, double u, double v, SurfaceCache& cache) {
   if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) return {true, surface.height(frame, u, v).height, {frame, u, v}};
   HeightJet jet = surface.coat().jet(frame.coat, u, v);
   lower_by_share(frame, u, v, jet);
@@ -396,7 +392,7 @@ RayStart start_over(const ReliefSurface& surface, const ReliefFrame& frame, doub
   for (int i = 0; i < most_steps; ++i) {
     ShellPlace place;
     ReliefFrame owner;
-    if (!surface.locate(ray.at(height), hint, owner, place)) break;
+    if (!surface.locate(ray.at(height), cache, {}, owner, place)) break;
     const FieldSample sample = surface.field(owner, place);
     const double rise = sample.gradient.dot(ray.direction);
     if (!(rise > 0.1)) break;
@@ -535,7 +531,7 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
   std::size_t changed_face = 0;
   double area = 0.0;
   double changed_area = 0.0;
-  Hint hint;
+  SurfaceCache cache;
   const auto finish_face = [&] {
     if (of == no_index) return;
     const auto [a, b, c] = mesh.corners(of);
@@ -560,7 +556,7 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
           copies.emplace_back(texel.index, source_of(texel, true_border));
           return 0.0;
         }
-        const RayStart start = start_over(surface, frame, texel.u, texel.v, hint);
+        const RayStart start = start_over(surface, frame, texel.u, texel.v, cache);
         if (!start.exact) {
           continued.emplace_back(texel.index, source_of(texel, 0.0));
           return start.height;

@@ -8,7 +8,7 @@
 
 #include "asperity/core/named_numbers.h"
 #include "asperity/core/result.h"
-#include "asperity/surface/surface.h"
+#include "asperity/surface/view.h"
 
 namespace asperity {
 
@@ -22,7 +22,8 @@ namespace asperity {
 ///              edges there, and searches take longer steps
 ///   grain      smallest length over which the surface changes (m); default a hundredth of the box's diagonal
 ///   sides      Sides::front (default): a solid, touched from outside; Sides::both: a sheet
-/// What it may do itself, const and noexcept, with SurfaceQuery's arguments: segment, contacts, closest.
+/// What it may do itself, const and noexcept, as a SurfaceView does: SweptHit first_touch(const Segment&, Sides) and
+/// Foot nearest(const Vec3& p, double bound).
 template <class T>
 concept ImplicitField = requires(const T& t, const Vec3& p) {
   { t.eval(p) }
@@ -39,14 +40,11 @@ struct CustomFacts {
   Sides sides = Sides::front;
 };
 
-/// What a type does, without its name: one indirection a query. Empty entries are done by CustomSurface. [servo]
+/// What a type does, without its name: one indirection a query. Empty entries are done by CustomView. [servo]
 struct CustomQueries {
   FieldSample (*eval)(const void* field, const Vec3& p) noexcept = nullptr;
-  SweptHit (*segment)(const void* field, const Segment& motion, double radius, Sides sides,
-                      Hint& hint) noexcept = nullptr;
-  void (*contacts)(const void* field, const Vec3& position, double radius, Sides sides, Hint& hint,
-                   ContactSet& out) noexcept = nullptr;
-  Foot (*closest)(const void* field, const Vec3& p, double bound, Hint& hint) noexcept = nullptr;
+  SweptHit (*first_touch)(const void* field, const Segment& motion, Sides sides) noexcept = nullptr;
+  Foot (*nearest)(const void* field, const Vec3& p, double bound) noexcept = nullptr;
 };
 
 /// The entries for one type. [build]
@@ -54,27 +52,22 @@ template <ImplicitField T>
 constexpr CustomQueries custom_queries() {
   CustomQueries queries;
   queries.eval = [](const void* field, const Vec3& p) noexcept { return static_cast<const T*>(field)->eval(p); };
-  if constexpr (requires { &T::segment; }) {
-    queries.segment = [](const void* field, const Segment& motion, double radius, Sides sides, Hint& hint) noexcept {
-      static_assert(noexcept(static_cast<const T*>(field)->segment(motion, radius, sides, hint)));
-      return SweptHit(static_cast<const T*>(field)->segment(motion, radius, sides, hint));
+  if constexpr (requires { &T::first_touch; }) {
+    queries.first_touch = [](const void* field, const Segment& motion, Sides sides) noexcept {
+      static_assert(noexcept(static_cast<const T*>(field)->first_touch(motion, sides)));
+      return SweptHit(static_cast<const T*>(field)->first_touch(motion, sides));
     };
   }
-  if constexpr (requires { &T::contacts; }) {
-    queries.contacts = [](const void* field, const Vec3& position, double radius, Sides sides, Hint& hint,
-                          ContactSet& out) noexcept {
-      static_assert(noexcept(static_cast<const T*>(field)->contacts(position, radius, sides, hint, out)));
-      static_cast<const T*>(field)->contacts(position, radius, sides, hint, out);
-    };
-  }
-  if constexpr (requires { &T::closest; }) {
-    queries.closest = [](const void* field, const Vec3& p, double bound, Hint& hint) noexcept {
-      static_assert(noexcept(static_cast<const T*>(field)->closest(p, bound, hint)));
-      return Foot(static_cast<const T*>(field)->closest(p, bound, hint));
+  if constexpr (requires { &T::nearest; }) {
+    queries.nearest = [](const void* field, const Vec3& p, double bound) noexcept {
+      static_assert(noexcept(static_cast<const T*>(field)->nearest(p, bound)));
+      return Foot(static_cast<const T*>(field)->nearest(p, bound));
     };
   }
   return queries;
 }
+
+class CustomView;
 
 /// A field's zeros as a surface: rays and motions by conservative steps (sphere tracing, Hart 1996), nearest points by
 /// Newton's method. Immutable; any number of threads.
@@ -85,6 +78,9 @@ class CustomSurface {
   /// value's, a value that is not finite, a box without surface). [build]
   template <ImplicitField T>
   static Result<CustomSurface> build(T field, std::string type = "custom") {
+    static_assert(
+        !requires { &T::closest; } && !requires { &T::segment; } && !requires { &T::contacts; },
+        "a type's own queries are first_touch and nearest");
     static constexpr CustomQueries queries = custom_queries<T>();
     CustomFacts facts;
     facts.bounds = field.bounds();
@@ -95,23 +91,25 @@ class CustomSurface {
     return build(std::make_shared<const T>(std::move(field)), sizeof(T), &queries, facts, std::move(type));
   }
 
-  /// First touch of a moving point, to within a skin; nothing is passed through as long as `lipschitz` holds. A search
-  /// that takes too many steps ends early, as if touched there. A ball goes by the nearest point found. [servo]
-  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
-  /// Planes at the nearest places found within the radius and the skin. [servo]
-  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept;
-  /// Nearest point within `bound`: the best of descents from p, from the last one, and from four places around p. What
-  /// all of these miss is not found. [servo]
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept;
+  /// What is touched of it. [servo]
+  [[nodiscard]] CustomView view() const noexcept;
   /// The field itself. [servo]
-  [[nodiscard]] FieldSample eval(const Vec3& p, Hint&) const noexcept { return eval(p); }
-  /// The same. [servo]
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
   [[nodiscard]] double skin() const noexcept { return skin_; }
   [[nodiscard]] Box bounds() const noexcept { return facts_.bounds; }
 
-  /// The gradient at p, unit; zero where there is none. [servo]
-  [[nodiscard]] Vec3 outward(const Vec3& p) const noexcept;
+  /// Leads q along the gradient onto the surface, to within settled(). [servo]
+  [[nodiscard]] bool land(Vec3& q) const noexcept;
+  /// Whether q lies in the box that holds the surface. [servo]
+  [[nodiscard]] bool holds(const Vec3& q) const noexcept {
+    const Box box = facts_.bounds.grown(skin_);
+    return (q.array() >= box.lower.array()).all() && (q.array() <= box.upper.array()).all();
+  }
+  /// Two places that are nearer to each other are one (m). [servo]
+  [[nodiscard]] double settled() const noexcept { return 1e-3 * skin_; }
+  /// What the type does itself, to be asked with field(). [servo]
+  [[nodiscard]] const CustomQueries& queries() const noexcept { return *queries_; }
+  [[nodiscard]] const void* field() const noexcept { return field_.get(); }
   [[nodiscard]] double grain() const noexcept { return facts_.grain; }
   /// Whether it may have edges. [servo]
   [[nodiscard]] bool has_folds() const noexcept { return !(facts_.bend < infinity); }
@@ -128,13 +126,6 @@ class CustomSurface {
   static Result<CustomSurface> build(std::shared_ptr<const void> field, std::size_t bytes, const CustomQueries* queries,
                                      const CustomFacts& facts, std::string type);
   [[nodiscard]] Status measure() const;
-  [[nodiscard]] bool land(Vec3& q) const noexcept;
-  [[nodiscard]] bool descend(const Vec3& p, Vec3& q) const noexcept;
-  void feet(const Vec3& p, double bound, Hint& hint, ContactSet& out) const noexcept;
-  [[nodiscard]] Foot foot_at(const Vec3& p, const Vec3& q) const noexcept;
-  [[nodiscard]] SweptHit trace(const Segment& motion, Sides sides) const noexcept;
-  [[nodiscard]] SweptHit trace_ball(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
-
   std::shared_ptr<const void> field_;
   const CustomQueries* queries_ = nullptr;
   CustomFacts facts_;
@@ -143,7 +134,6 @@ class CustomSurface {
   std::string type_;
   std::uint64_t identity_ = 0;
 };
-static_assert(SurfaceQuery<CustomSurface>);
 
 /// Makes a surface of the numbers in a scene file.
 using CustomSurfaceFactory = std::function<Result<CustomSurface>(NamedNumbers& numbers)>;

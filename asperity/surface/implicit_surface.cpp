@@ -50,14 +50,14 @@ std::size_t ImplicitSurface::memory_bytes() const noexcept {
   return bytes;
 }
 
-FieldSample ImplicitSurface::eval(const Vec3& p, Hint& hint) const noexcept {
+FieldSample ImplicitSurface::eval(const Vec3& p, SurfaceCache& cache) const noexcept {
   FieldSample sample;
   FieldJet jet;
-  if (!iso_.view().sample(p, hint.iso, jet)) return sample;
+  if (!iso_.view(cache).sample(p, jet)) return sample;
   sample.value = jet.value - parts_.offset;
   sample.gradient = jet.gradient;
-  sample.element = iso_.element_of(0, p);
-  if (textured()) sample.height = untextured().trilinear(p, hint.sparse).value - jet.value;
+  sample.element = iso_.view(cache).element_at(p);
+  if (textured()) sample.height = untextured().trilinear(p, cache.sparse).value - jet.value;
   return sample;
 }
 

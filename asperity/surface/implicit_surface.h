@@ -21,8 +21,8 @@ struct ImplicitParts {
   double shell_thickness = 0.0;
 };
 
-/// The zero set of a signed potential on a sparse grid. Its queries are those of the isosurface of the potential; laws
-/// that are made for potentials read the grid itself.
+/// The zero set of a signed potential on a sparse grid. It is touched as the isosurface of the potential; laws that are
+/// made for potentials read the grid itself.
 class ImplicitSurface {
  public:
   /// Errors: bad_value (no grid, an offset outside the stored band, a potential that is nowhere zero, face indices
@@ -56,18 +56,10 @@ class ImplicitSurface {
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
-  // SurfaceQuery, by the isosurface.
-  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
-    return iso_.segment(motion, radius, sides, hint);
-  }
-  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept {
-    iso_.contacts(position, radius, sides, hint, out);
-  }
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept {
-    return iso_.closest(p, bound, hint);
-  }
+  /// What is touched: the isosurface of the potential. [servo]
+  [[nodiscard]] IsoView view(SurfaceCache& cache) const noexcept { return iso_.view(cache); }
   /// The potential itself, less the offset. [servo]
-  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  [[nodiscard]] FieldSample eval(const Vec3& p, SurfaceCache& cache) const noexcept;
   [[nodiscard]] double skin() const noexcept { return iso_.skin(); }
   [[nodiscard]] Box bounds() const noexcept { return iso_.bounds(); }
 
@@ -77,6 +69,5 @@ class ImplicitSurface {
   ImplicitParts parts_;
   IsoSurface iso_;
 };
-static_assert(SurfaceQuery<ImplicitSurface>);
 
 }  // namespace asperity

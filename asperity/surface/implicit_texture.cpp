@@ -12,6 +12,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/surface/iso_surface.h"
+#include "asperity/surface/walk.h"
 
 namespace asperity {
 
@@ -298,18 +299,9 @@ class FootFinder {
       const Vec3 v = p - x;
       const double depth = v.dot(normal);
       const Vec3 s = v - depth * normal;
-      const double rate = s.norm();
-      if (rate <= at_rest * voxel_) return true;
-      // Newton's step of the distance along the surface, or down its slope where that leads to no minimum.
+      if (s.norm() <= at_rest * voxel_) return true;
       const Mat3 bend = jet.hessian / length;
-      const Vec3 along = s / rate;
-      const Vec3 across = normal.cross(along);
-      const double a = 1.0 + depth * along.dot(bend * along);
-      const double b = depth * along.dot(bend * across);
-      const double c = 1.0 + depth * across.dot(bend * across);
-      const double determinant = a * c - b * b;
-      Vec3 step = s;
-      if (a > 0.05 && c > 0.0 && determinant > 0.05 * c) step = (rate / determinant) * (c * along - b * across);
+      Vec3 step = tangent_step(normal, s, depth, bend);
       step *= std::min(1.0, voxel_ / step.norm());
       if (!descend(p, step, 0.5 * step.dot(bend * step) * normal, x)) return true;
     }
@@ -536,14 +528,12 @@ struct DistanceError {
 DistanceError distance_error(const SparseGrid& grid, const SparseSource& source, const std::vector<Vec3>& sample,
                              double from, double to, const Progress& progress) {
   const ScalarField field(std::make_shared<const SparseGrid>(grid));
-  const IsoView view{&field, 0, 0.0, 1.0};
   std::vector<double> error(sample.size(), not_a_number);
   const ParallelSettings settings = blocks_shared("measuring", from, to, progress);
-  std::vector<IsoHint> hints(parallel_workers(sample.size(), settings));
-  std::vector<SparseHint> bricks(hints.size());
+  std::vector<CellCache> caches(parallel_workers(sample.size(), settings));
+  std::vector<SparseHint> bricks(caches.size());
   parallel_for(sample.size(), settings, [&](std::size_t i, unsigned worker) {
-    hints[worker].has_foot = false;
-    const Foot foot = view.closest(sample[i], 2.0 * source.voxel, hints[worker]);
+    const Foot foot = IsoView{&field, 0, 0.0, 1.0, &caches[worker]}.nearest(sample[i], 2.0 * source.voxel);
     if (foot.found()) error[i] = std::abs(std::abs(grid.trilinear(sample[i], bricks[worker]).value) - foot.distance);
   });
   DistanceError all;

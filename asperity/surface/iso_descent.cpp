@@ -1,10 +1,10 @@
-#include "asperity/surface/iso_descent.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "asperity/core/fixed_vector.h"
-#include "asperity/surface/relief_descent.h"
+#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/walk.h"
 
 namespace asperity {
 
@@ -34,31 +34,30 @@ struct Pull {
 
 class Leader {
  public:
-  Leader(const IsoView& surface, IsoDescent& descent, IsoHint& hint) noexcept
+  Leader(const IsoView& surface, const Goal& goal, double side, IsoSpot& spot) noexcept
       : surface_(surface),
         axes_(surface.field->axes(surface.level)),
-        descent_(descent),
-        hint_(hint),
-        sign_(descent.side * surface.sigma),
-        x_(descent.point) {}
+        goal_(goal),
+        sign_(side * surface.sigma),
+        x_(spot.point),
+        away_(spot.away) {}
 
-  IsoEnd run() noexcept {
-    IsoEnd end = IsoEnd::limited;
-    while (descent_.moves < descent_.budget) {
-      if (const Turn turn = move(); turn != Turn::moved) {
-        end = turn == Turn::rest ? IsoEnd::rest : turn == Turn::left ? IsoEnd::left : IsoEnd::rim;
-        break;
-      }
+  DescentEnd run() noexcept {
+    while (moves_ < budget) {
+      if (const Step step = move(); step != Step::moved)
+        return step == Step::rest ? DescentEnd::rest : step == Step::left ? DescentEnd::left : DescentEnd::rim;
     }
-    descent_.point = x_;
-    return end;
+    return DescentEnd::limited;
   }
+  /// On the side touched; zero where nothing was found out.
+  [[nodiscard]] const Vec3& normal() const noexcept { return normal_; }
 
  private:
-  enum class Turn { moved, rest, left, rim };
+  enum class Step { moved, rest, left, rim };
+  static constexpr int budget = 400;  // evaluations
 
   const CellPolynomial* load(const CellIndex& cell) noexcept {
-    CellPolynomial& slot = hint_.slot(surface_.field->identity(), surface_.level, cell);
+    CellPolynomial& slot = surface_.cells->slot(surface_.field->identity(), surface_.level, cell);
     return surface_.field->load(surface_.level, cell, slot) ? &slot : nullptr;
   }
 
@@ -91,9 +90,8 @@ class Leader {
     if (!(length > 0.0)) return false;
     pull.known = true;
     pull.normal = gradient / length;
-    pull.outside = (descent_.goal - x_).dot(pull.normal) > 0.0;
-    const Vec3 goal =
-        descent_.friction > 0.0 ? friction_goal(x_, pull.normal, descent_.goal, descent_.friction) : descent_.goal;
+    pull.outside = (goal_.point - x_).dot(pull.normal) > 0.0;
+    const Vec3 goal = goal_.friction > 0.0 ? friction_goal(x_, pull.normal, goal_.point, goal_.friction) : goal_.point;
     Vec3 v = goal - x_;
     if (face >= 0) v[face] = 0.0;
     depth = v.dot(pull.normal);
@@ -116,7 +114,7 @@ class Leader {
       jet.gradient = arrived_gradient_;
       jet.hessian = bend_;
     } else {
-      ++descent_.moves;
+      ++moves_;
       jet = cell->jet(x_);
       bend_ = jet.hessian;
       bend_cell_ = index;
@@ -127,19 +125,12 @@ class Leader {
     if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
     // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
     const Mat3 bend = (sign_ / length) * jet.hessian;
-    Vec3 along = s / pull.rate;
-    Vec3 across = pull.normal.cross(along);
-    const double a = 1.0 + depth * along.dot(bend * along);
-    pull.step = s;
     if (face >= 0) {
-      if (a > 0.05) pull.step = s / a;
+      const Vec3 along = s / pull.rate;
+      const double a = 1.0 + depth * along.dot(bend * along);
+      pull.step = a > 0.05 ? Vec3(s / a) : s;
     } else {
-      const double b = depth * along.dot(bend * across);
-      const double c = 1.0 + depth * across.dot(bend * across);
-      const double determinant = a * c - b * b;
-      if (a > 0.05 && determinant > 0.05 * c && c > 0.0) {
-        pull.step = (pull.rate / determinant) * (c * along - b * across);
-      }
+      pull.step = tangent_step(pull.normal, s, depth, bend);
     }
     pull.drop = 0.5 * pull.step.dot(bend * pull.step);
     return pull;
@@ -156,14 +147,14 @@ class Leader {
     return true;
   }
 
-  Turn move() noexcept {
+  Step move() noexcept {
     find_cells();
     if (!on_face_[0] && !on_face_[1] && !on_face_[2]) {
       const Pull pull = pull_in({{first_[0], first_[1], first_[2]}}, -1);
-      if (!pull.known) return Turn::rim;
-      descent_.normal = descent_.away = pull.normal;
-      if (descent_.may_leave && pull.outside) return Turn::left;
-      return !pull.at_rest && follow(pull, -1) ? Turn::moved : Turn::rest;
+      if (!pull.known) return Step::rim;
+      normal_ = away_ = pull.normal;
+      if (goal_.may_leave && pull.outside) return Step::left;
+      return !pull.at_rest && follow(pull, -1) ? Step::moved : Step::rest;
     }
     FixedVector<Pull, 8> leads;
     bool all_outside = true;
@@ -175,12 +166,12 @@ class Leader {
         for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) {
           const Pull pull = pull_in({{i, j, k}}, -1);
           if (!pull.known) continue;
-          if (!any) descent_.normal = pull.normal;
+          if (!any) normal_ = pull.normal;
           any = true;
           sum += pull.normal;
           all_outside = all_outside && pull.outside;
           if (pull.at_rest) {
-            if (!rests) descent_.normal = pull.normal;
+            if (!rests) normal_ = pull.normal;
             rests = true;
           } else if (leads_into(pull.cell, pull.step, -1)) {
             leads.push_back(pull);
@@ -188,35 +179,35 @@ class Leader {
         }
       }
     }
-    if (!any) return Turn::rim;
-    descent_.away = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : descent_.normal;
-    if (descent_.may_leave && all_outside) return Turn::left;
+    if (!any) return Step::rim;
+    away_ = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : normal_;
+    if (goal_.may_leave && all_outside) return Step::left;
     while (!leads.empty()) {
       std::size_t best = 0;
       for (std::size_t i = 1; i < leads.size(); ++i) best = leads[i].rate > leads[best].rate ? i : best;
-      descent_.normal = leads[best].normal;
-      if (follow(leads[best], -1)) return Turn::moved;
+      normal_ = leads[best].normal;
+      if (follow(leads[best], -1)) return Step::moved;
       leads.swap_remove(best);
       rests = rests || leads.empty();
     }
-    if (rests) return Turn::rest;
+    if (rests) return Step::rest;
     // No cell leads anywhere but out of itself: a crease, along which it may go, or the rim.
-    if (descent_.may_leave && at_rim()) return Turn::rim;
+    if (goal_.may_leave && at_rim()) return Step::rim;
     for (int face = 0; face < 3; ++face) {
       if (!on_face_[face]) continue;
       for (const Pull& pull : {pull_in(cell_towards(face, 1.0), face), pull_in(cell_towards(face, -1.0), face)}) {
         if (!pull.known || pull.at_rest || !leads_into(pull.cell, pull.step, face)) continue;
-        if (follow(pull, face)) return Turn::moved;
+        if (follow(pull, face)) return Step::moved;
       }
     }
-    return Turn::rest;
+    return Step::rest;
   }
 
   /// The cell on the face across `face` that the goal pulls towards, or away from (direction -1).
   CellIndex cell_towards(int face, double direction) const noexcept {
     CellIndex cell;
     for (int a = 0; a < 3; ++a) {
-      const bool up = direction * (descent_.goal[a] - x_[a]) > 0.0;
+      const bool up = direction * (goal_.point[a] - x_[a]) > 0.0;
       cell.at[a] = a != face && up ? last_[static_cast<std::size_t>(a)] : first_[static_cast<std::size_t>(a)];
     }
     return cell;
@@ -224,10 +215,10 @@ class Leader {
 
   /// On the volume's border, or that of what is known, with the goal beyond.
   bool at_rim() noexcept {
-    const double noise = along_face * (descent_.goal - x_).norm();
+    const double noise = along_face * (goal_.point - x_).norm();
     for (std::size_t a = 0; a < 3; ++a) {
       if (!on_face_[a]) continue;
-      const double d = descent_.goal[static_cast<int>(a)] - x_[static_cast<int>(a)];
+      const double d = goal_.point[static_cast<int>(a)] - x_[static_cast<int>(a)];
       if (std::abs(d) <= noise) continue;
       if (node_[a] == (d > 0.0 ? axes_[a].cells() : 0U)) return true;
       if (first_[a] == last_[a]) continue;
@@ -242,12 +233,12 @@ class Leader {
   bool follow(const Pull& pull, int face) noexcept {
     constexpr int most_halvings = 12;
     const CellPolynomial* cell = load(pull.cell);
-    const double before = (descent_.goal - x_).squaredNorm();
+    const double before = (goal_.point - x_).squaredNorm();
     double share = 1.0;
     for (int attempt = 0; attempt < most_halvings; ++attempt, share *= 0.5) {
       Vec3 y = x_ + share * pull.step - (share * share * pull.drop) * pull.normal;
       if (!arrive(*cell, face, y)) continue;
-      if (!((descent_.goal - y).squaredNorm() < before)) continue;
+      if (!((goal_.point - y).squaredNorm() < before)) continue;
       if (!same_sheet(*cell, pull, y)) {
         cell = load(pull.cell);
         continue;
@@ -314,7 +305,7 @@ class Leader {
     const double close = nearly_on_surface * cell.width.minCoeff();
     arrived_ = false;
     for (int round = 0; round < most_rounds; ++round) {
-      ++descent_.moves;
+      ++moves_;
       const FieldJet jet = cell.gradient(y);
       Vec3 gradient = jet.gradient;
       for (int a = 0; a < 3; ++a) {
@@ -350,28 +341,31 @@ class Leader {
     const double skin = surface_.skin();
     const Vec3 from = x_ + skin * pull.normal;
     const Vec3 to = y + skin * (gradient / length);
-    IsoHint scratch;
+    CellCache scratch;
+    IsoView view = surface_;
+    view.cells = &scratch;
     const auto outside = [&](const Vec3& p) {
       FieldJet jet;
-      return surface_.sample(p, scratch, jet) && sign_ * (jet.value - surface_.threshold) > 0.0;
+      return view.sample(p, jet) && sign_ * (jet.value - surface_.threshold) > 0.0;
     };
     if (!outside(from) || !outside(to)) return false;
-    if (!surface_.first_crossing({from, to}, scratch).found) return true;
+    if (!view.first_crossing({from, to}).found) return true;
     const double way = (y - x_).norm();
     for (const double lift : {0.1, 0.5, 1.0}) {
       const Vec3 apex = 0.5 * (from + to) + lift * way * pull.normal;
-      if (!surface_.first_crossing({from, apex}, scratch).found && !surface_.first_crossing({apex, to}, scratch).found)
-        return true;
+      if (!view.first_crossing({from, apex}).found && !view.first_crossing({apex, to}).found) return true;
     }
     return false;
   }
 
   const IsoView& surface_;
   const GridAxes& axes_;
-  IsoDescent& descent_;
-  IsoHint& hint_;
+  const Goal& goal_;
   double sign_;
-  Vec3 x_;
+  Vec3& x_;
+  Vec3& away_;
+  Vec3 normal_ = Vec3::Zero();
+  int moves_ = 0;
   std::uint32_t first_[3] = {};
   std::uint32_t last_[3] = {};
   std::uint32_t node_[3] = {};  ///< along the axes on whose faces x lies
@@ -385,8 +379,12 @@ class Leader {
 
 }  // namespace
 
-IsoEnd descend(const IsoView& surface, IsoDescent& descent, IsoHint& hint) noexcept {
-  return Leader(surface, descent, hint).run();
+DescentEnd IsoView::descend(Place& place, IsoSpot& spot, const Goal& goal) const noexcept {
+  Leader leader(*this, goal, place.side(), spot);
+  const DescentEnd end = leader.run();
+  if (!leader.normal().isZero()) spot.front = place.side() * leader.normal();
+  place.at = spot.point;
+  return end;
 }
 
 }  // namespace asperity

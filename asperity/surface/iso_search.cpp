@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "asperity/surface/iso_descent.h"
+#include "asperity/surface/iso_surface.h"
 
 namespace asperity {
 
@@ -112,19 +112,17 @@ bool clip(const Segment& motion, const Box& box, double& from, double& to) noexc
 /// Leaves of the octree nearest first, cut off at what has been found.
 class NearestSearch {
  public:
-  NearestSearch(const IsoView& surface, const Vec3& p, double bound, IsoHint& hint) noexcept
-      : surface_(surface), p_(p), best_(bound), hint_(hint) {
+  NearestSearch(const IsoView& surface, const Vec3& p, double bound, const Place& start) noexcept
+      : surface_(surface), p_(p), best_(bound), start_(start) {
     foot_.distance = bound;
   }
 
   Foot run() noexcept {
     const ScalarField& field = *surface_.field;
-    if (hint_.has_foot) lead(hint_.foot);
+    if (start_.known()) lead(start_.at);
     // Downhill from the point itself: near a smooth surface that is all.
     lead(p_.cwiseMax(field.bounds().lower).cwiseMin(field.bounds().upper));
     visit(field.octree(surface_.level).root());
-    hint_.has_foot = foot_.found();
-    if (foot_.found()) hint_.foot = foot_.point;
     return foot_;
   }
 
@@ -191,7 +189,7 @@ class NearestSearch {
   }
 
   void visit_cell(const CellIndex& index) noexcept {
-    CellPolynomial& cell = hint_.other;
+    CellPolynomial& cell = surface_.cells->other;
     if (surface_.field->approach(surface_.level, index, surface_.threshold, cell) != CellSide::near) return;
     // Within the cell the surface is looked for from its place nearest to p, towards its middle and its corners.
     const CellPolynomial here = cell;
@@ -235,7 +233,7 @@ class NearestSearch {
     FieldJet jet;
     bool on_surface = false;
     for (int step = 0; step < most_steps && !on_surface; ++step) {
-      if (!surface_.sample(x, hint_, jet)) return;
+      if (!surface_.sample(x, jet)) return;
       const double squared = jet.gradient.squaredNorm();
       if (!(squared > 0.0)) return;
       const double off = surface_.threshold - jet.value;
@@ -246,35 +244,29 @@ class NearestSearch {
       x = (x + move).cwiseMax(field.bounds().lower).cwiseMin(field.bounds().upper);
     }
     if (!on_surface) return;
-    IsoDescent descent;
-    descent.point = x;
-    descent.goal = p_;
-    descent.may_leave = false;
-    descent.side = surface_.sigma * (p_ - x).dot(jet.gradient) >= 0.0 ? 1.0 : -1.0;
-    descend(surface_, descent, hint_);
-    const double distance = (descent.point - p_).norm();
+    Place place{0, !(surface_.sigma * (p_ - x).dot(jet.gradient) >= 0.0), x};
+    IsoSpot spot{x, Vec3::Zero(), Vec3::Zero()};
+    surface_.descend(place, spot, {.point = p_, .may_leave = false});
+    const double distance = (spot.point - p_).norm();
     if (distance >= best_) return;
     best_ = distance;
-    foot_.point = descent.point;
+    foot_.point = foot_.at = spot.point;
     foot_.distance = distance;
-    const Vec3 outward = surface_.outward(descent.point, hint_);
-    foot_.normal = (p_ - descent.point).dot(outward) >= 0.0 ? outward : Vec3(-outward);
-    const GridAxes& axes = field.axes(surface_.level);
-    const CellIndex cell = field.cell_of(surface_.level, descent.point);
-    foot_.element = cell.at[0] + axes[0].cells() * (cell.at[1] + axes[1].cells() * cell.at[2]);
-    if (foot_.element == no_index) foot_.element = 0;
+    const Vec3 outward = surface_.outward(spot.point);
+    foot_.normal = (p_ - spot.point).dot(outward) >= 0.0 ? outward : Vec3(-outward);
+    foot_.element = surface_.element_at(spot.point);
   }
 
   const IsoView& surface_;
   Vec3 p_;
   double best_;
-  IsoHint& hint_;
+  const Place& start_;
   Foot foot_;
 };
 
 }  // namespace
 
-IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double from) const noexcept {
+IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const noexcept {
   IsoCrossing crossing;
   double start = from;
   double end = 1.0;
@@ -283,7 +275,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
   const MinMaxOctree& octree = field->octree(level);
   CellWalk walk(axes, motion, start, end);
   // Where it starts it mostly was at the last tick.
-  CellPolynomial& polynomial = hint.slot(field->identity(), level, walk.cell());
+  CellPolynomial& polynomial = cells->slot(field->identity(), level, walk.cell());
   double sign = 0.0;  // of value - threshold; 0: not known yet
   std::uint32_t leaf[3] = {no_index, no_index, no_index};
   for (bool more = true; more;) {
@@ -345,26 +337,43 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, IsoHint& hint, double
   return crossing;
 }
 
-IsoCrossing IsoView::first_touch(const Segment& motion, Sides sides, IsoHint& hint) const noexcept {
+SweptHit IsoView::first_touch(const Segment& motion, Sides sides) const noexcept {
   constexpr int most_crossings = 256;
-  IsoCrossing crossing = first_crossing(motion, hint);
+  IsoCrossing crossing = first_crossing(motion);
   const double length = (motion.to - motion.from).norm();
   for (int i = 0; sides == Sides::front && crossing.found && !crossing.inward && i < most_crossings; ++i) {
-    crossing = first_crossing(motion, hint, crossing.t + 1e-9 * field->narrowest_cell() / length);
+    crossing = first_crossing(motion, crossing.t + 1e-9 * field->narrowest_cell() / length);
   }
-  if (crossing.found && sides == Sides::front && !crossing.inward) crossing.found = false;
-  return crossing;
+  SweptHit hit;
+  if (!crossing.found || (sides == Sides::front && !crossing.inward)) return hit;
+  hit.hit = true;
+  hit.t = crossing.t;
+  hit.side = crossing.inward ? 1.0 : -1.0;
+  hit.contact.point = hit.contact.at = crossing.point;
+  hit.contact.normal = hit.side * crossing.outward;
+  hit.contact.distance = 0.0;
+  hit.contact.element = element_of(crossing.cell);
+  return hit;
 }
 
-Foot IsoView::closest(const Vec3& p, double bound, IsoHint& hint) const noexcept {
-  return NearestSearch(*this, p, bound, hint).run();
+Foot IsoView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
+  return NearestSearch(*this, p, bound, start).run();
 }
 
-Vec3 IsoView::outward(const Vec3& p, IsoHint& hint) const noexcept {
+Vec3 IsoView::outward(const Vec3& p) const noexcept {
   FieldJet jet;
-  if (!sample(p, hint, jet)) return Vec3::Zero();
+  if (!sample(p, jet)) return Vec3::Zero();
   const double length = jet.gradient.norm();
   return length > 0.0 ? Vec3((sigma / length) * jet.gradient) : Vec3::Zero();
+}
+
+bool IsoView::launch(const Place& place, const IsoSpot& spot, Vec3& from) const noexcept {
+  // At the rim it starts within the volume: what comes in from outside has no side.
+  const Box bounds = field->bounds();
+  from = (spot.point + skin() * spot.away).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+  // In a corner narrower than the skin there is no place to fly from.
+  FieldJet jet;
+  return !sample(from, jet) || place.side() * sigma * (jet.value - threshold) >= 0.0;
 }
 
 }  // namespace asperity

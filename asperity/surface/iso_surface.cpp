@@ -122,74 +122,16 @@ void IsoSurface::measure() {
   typical_slope_ = *middle;
 }
 
-namespace {
-
-SweptHit hit_of(const IsoCrossing& crossing, const IsoSurface& surface) noexcept {
-  SweptHit hit;
-  if (!crossing.found) return hit;
-  hit.hit = true;
-  hit.t = crossing.t;
-  hit.contact.point = crossing.point;
-  hit.contact.normal = crossing.inward ? crossing.outward : Vec3(-crossing.outward);
-  hit.contact.distance = 0.0;
-  hit.contact.element = surface.element_of(0, crossing.cell);
-  return hit;
-}
-
-}  // namespace
-
-SweptHit IsoSurface::segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
-  if (radius <= 0.0) return hit_of(view().first_touch(motion, sides, hint.iso), *this);
-  // A ball: what its centre would meet bounds the search; before that, steps that no surface fits between.
-  SweptHit result = hit_of(view().first_touch(motion, sides, hint.iso), *this);
-  const double length = (motion.to - motion.from).norm();
-  if (length == 0.0) return result;
-  const Vec3 direction = (motion.to - motion.from) / length;
-  constexpr int most_steps = 4096;
-  const double least = 1e-4 * radius;
-  double travelled = 0.0;
-  for (int step = 0; step < most_steps && travelled <= length * result.t; ++step) {
-    const Vec3 centre = motion.from + travelled * direction;
-    const Foot foot = closest(centre, radius + 0.5 * radius + least, hint);
-    if (foot.found()) {
-      const double gap = foot.distance - radius;
-      Vec3 away = centre - foot.point;
-      if (foot.distance > skin()) away /= foot.distance;
-      const bool front = sides == Sides::both || away.dot(view().outward(foot.point, hint.iso)) >= 0.0;
-      if (front && gap <= least && away.dot(direction) < 0.0) {
-        result.hit = true;
-        result.t = travelled / length;
-        result.contact = foot;
-        result.contact.normal = foot.distance > skin() ? away : foot.normal;
-        return result;
-      }
-      travelled += std::max(least, front ? gap : 0.5 * radius);
-    } else {
-      travelled += 0.5 * radius;
-    }
-  }
-  return result;
-}
-
-void IsoSurface::contacts(const Vec3& position, double radius, Sides sides, Hint& hint,
-                          ContactSet& out) const noexcept {
-  const Foot foot = closest(position, radius + 2.0 * skin(), hint);
-  if (!foot.found()) return;
-  if (sides == Sides::front && foot.normal.dot(view().outward(foot.point, hint.iso)) < 0.0) return;
-  out.push_back(foot);
-}
-
-FieldSample IsoSurface::eval(const Vec3& p, Hint& hint) const noexcept {
-  FieldSample sample;
+FieldSample IsoView::eval(const Vec3& p) const noexcept {
+  FieldSample out;
   FieldJet jet;
-  const IsoView surface = view();
-  if (!surface.sample(p, hint.iso, jet)) return sample;
+  if (!sample(p, jet)) return out;
   const double length = jet.gradient.norm();
-  if (!(length > 0.0)) return sample;
-  sample.value = surface.sigma * (jet.value - threshold_) / length;
-  sample.gradient = (surface.sigma / length) * jet.gradient;
-  sample.element = element_of(0, p);
-  return sample;
+  if (!(length > 0.0)) return out;
+  out.value = sigma * (jet.value - threshold) / length;
+  out.gradient = (sigma / length) * jet.gradient;
+  out.element = element_at(p);
+  return out;
 }
 
 }  // namespace asperity

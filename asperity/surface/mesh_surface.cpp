@@ -42,11 +42,10 @@ bool boundary_vertex(const TriangleMesh& mesh, std::uint32_t vertex) noexcept {
 
 bool on_boundary(const TriangleMesh& mesh, const Foot& foot) noexcept {
   for (int k = 0; k < 3; ++k) {
-    if (foot.barycentric[k] >= 1.0)
-      return boundary_vertex(mesh, mesh.triangles()[foot.element][static_cast<std::size_t>(k)]);
+    if (foot.at[k] >= 1.0) return boundary_vertex(mesh, mesh.triangles()[foot.element][static_cast<std::size_t>(k)]);
   }
   for (int k = 0; k < 3; ++k) {
-    if (foot.barycentric[k] <= 0.0 && mesh.neighbour(foot.element, (k + 1) % 3) == no_index) return true;
+    if (foot.at[k] <= 0.0 && mesh.neighbour(foot.element, (k + 1) % 3) == no_index) return true;
   }
   return false;
 }
@@ -54,7 +53,7 @@ bool on_boundary(const TriangleMesh& mesh, const Foot& foot) noexcept {
 }  // namespace
 
 bool beyond_rim(const TriangleMesh& mesh, const Foot& foot, const Vec3& probe, double skin) noexcept {
-  if (foot.barycentric.minCoeff() > 0.0 || !on_boundary(mesh, foot)) return false;
+  if (foot.at.minCoeff() > 0.0 || !on_boundary(mesh, foot)) return false;
   const Vec3 normal = mesh.face_normal(foot.element);
   const Vec3 offset = probe - foot.point;
   return (offset - offset.dot(normal) * normal).norm() > skin;
@@ -68,11 +67,11 @@ Vec3 interpolated_normal(const TriangleMesh& mesh, std::uint32_t face, const Vec
   return length > 0.0 ? Vec3(sum / length) : mesh.face_normal(face);
 }
 
-FieldSample MeshSurface::eval(const Vec3& p, Hint& hint) const noexcept {
-  const Foot nearest = index_.closest(p, infinity, hint.patch);
+FieldSample MeshSurface::eval(const Vec3& p, SurfaceCache& cache) const noexcept {
+  const Foot nearest = index_.closest(p, infinity, cache.patch);
   FieldSample sample;
   if (!nearest.found()) return sample;
-  const bool outside = (p - nearest.point).dot(pseudonormal(mesh(), nearest.element, nearest.barycentric)) >= 0.0;
+  const bool outside = (p - nearest.point).dot(pseudonormal(mesh(), nearest.element, nearest.at)) >= 0.0;
   sample.value = outside ? nearest.distance : -nearest.distance;
   sample.gradient = outside ? nearest.normal : Vec3(-nearest.normal);
   // On the face itself the normal is the face's own, whichever side it was taken from.

@@ -4,26 +4,21 @@
 
 #include "asperity/geometry/mesh_refitter.h"
 #include "asperity/geometry/triangle_index.h"
-#include "asperity/surface/surface.h"
+#include "asperity/surface/view.h"
 
 namespace asperity {
+
+class TriangleView;
 
 /// A triangle mesh touched as it is. Copies share mesh and search structure.
 class MeshSurface {
  public:
   explicit MeshSurface(TriangleIndex index) : index_(std::move(index)) {}
 
-  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
-    return index_.sweep(motion, radius, sides, hint.patch);
-  }
-  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept {
-    index_.contacts(position, radius, sides, hint.patch, out);
-  }
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept {
-    return index_.closest(p, bound, hint.patch);
-  }
+  /// [servo]
+  [[nodiscard]] TriangleView view(SurfaceCache& cache) const noexcept;
   /// Signed distance: exact where the mesh is closed and oriented; elsewhere signed by the nearest feature's normal.
-  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  [[nodiscard]] FieldSample eval(const Vec3& p, SurfaceCache& cache) const noexcept;
   [[nodiscard]] double skin() const noexcept { return index_.skin(); }
   [[nodiscard]] Box bounds() const noexcept { return index_.mesh().bounds(); }
 
@@ -37,8 +32,6 @@ class MeshSurface {
  private:
   TriangleIndex index_;
 };
-static_assert(SurfaceQuery<MeshSurface>);
-
 /// A mesh as a reader or a generator gives it, ready to be touched: welded, checked and searched by a bounding volume
 /// hierarchy. `settings.scale` is the source's unit (m). Errors: those of TriangleMesh::build. [build]
 Result<std::shared_ptr<const MeshSurface>> make_mesh_surface(MeshSource source, const MeshBuildSettings& settings = {});

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "asperity/surface/detail/parametric_shapes.h"
-#include "asperity/surface/parametric_descent.h"
-#include "asperity/surface/parametric_surface.h"
+#include "asperity/surface/parametric_view.h"
+#include "asperity/surface/tangents.h"
 
 namespace asperity {
 
@@ -285,7 +285,7 @@ class Crossing {
     for (int i = 0; i < most_newton; ++i) {
       Vec3 du;
       Vec3 dv;
-      ParametricSurface::parameter_gradients(jet, du, dv);
+      parameter_gradients(jet.u, jet.v, du, dv);
       const Vec3 normal = jet.u.cross(jet.v);
       const double rate = normal.dot(way_);
       if (rate == 0.0) return false;
@@ -329,7 +329,7 @@ class Nearest {
   }
 
   /// From a place that may be near it already.
-  void start(const Vec2& place) noexcept { take(surface_.jet(place), place); }
+  void start(const Vec2& place) noexcept { take(place); }
 
   void run(const ParametricPatches& tree) noexcept {
     tree.near(p_, limit_,
@@ -338,27 +338,21 @@ class Nearest {
 
   bool found = false;
   Vec2 uv = Vec2::Zero();
-  ParametricJet jet;
-  Vec3 normal = Vec3::Zero();
+  ParametricSpot spot;
   [[nodiscard]] double distance() const noexcept { return best_; }
 
  private:
-  void take(const ParametricJet& at, const Vec2& place) noexcept {
-    ParametricDescent descent;
-    descent.uv = place;
-    descent.jet = at;
-    descent.goal = p_;
-    descent.side = surface_.normal(at).dot(p_ - at.point) < 0.0 ? -1.0 : 1.0;
-    descent.may_leave = false;
-    descend(surface_, descent);
-    const double distance = (descent.jet.point - p_).norm();
+  void take(const Vec2& from) noexcept {
+    ParametricSpot at = surface_.view().spot(from);
+    Place place{0, at.front.dot(p_ - at.point) < 0.0, {from.x(), from.y(), 0.0}};
+    surface_.view().descend(place, at, {.point = p_, .may_leave = false});
+    const double distance = (at.point - p_).norm();
     if (!(distance <= best_)) return;
     found = true;
     best_ = distance;
     limit_ = best_ - tolerance_;
-    uv = descent.uv;
-    jet = descent.jet;
-    normal = descent.normal;
+    uv = place.at.head<2>();
+    spot = at;
   }
 
   [[nodiscard]] double least(const Patch& patch, const Bound& bound) const noexcept {
@@ -394,10 +388,7 @@ class Nearest {
       if (++nodes_ > most_nodes) return;
       const Bound bound = patches_.bound(patch);
       if (least(patch, bound) >= limit_) continue;
-      if ((bound.jet.point - p_).norm() < best_) {
-        const Vec2 place = surface_.within_range(patch.centre);
-        take(surface_.jet(place), place);
-      }
+      if ((bound.jet.point - p_).norm() < best_) take(surface_.within_range(patch.centre));
       if (bound.reach <= tolerance_ || size + 2 > most_waiting) continue;
       Patch other = Patches::halve(patch, bound);
       const bool in_u = other.centre.x() != patch.centre.x();
@@ -418,124 +409,48 @@ class Nearest {
 
 }  // namespace
 
-Foot ParametricSurface::closest(const Vec3& p, double bound, Hint& hint) const noexcept {
+Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
   Foot foot;
   if (!(bound >= 0.0)) return foot;
-  Nearest nearest(*this, p, bound);
-  if (hint.parametric.owner == identity_) nearest.start(within_range(hint.parametric.uv));
-  nearest.run(patches_);
-  if (!nearest.found) return foot;
-  hint.parametric = {identity_, nearest.uv};
-  foot.point = nearest.jet.point;
-  foot.distance = nearest.distance();
+  Nearest search(*surface_, p, bound);
+  if (start.known()) search.start(surface_->within_range(start.at.head<2>()));
+  search.run(surface_->patches_);
+  if (!search.found) return foot;
+  foot.point = search.spot.point;
+  foot.distance = search.distance();
   const Vec3 off = p - foot.point;
-  foot.normal = foot.distance > 1e-3 * skin_ ? Vec3(off / foot.distance) : nearest.normal;
-  foot.element = element_of(nearest.uv);
+  foot.normal = foot.distance > 1e-3 * skin() ? Vec3(off / foot.distance) : search.spot.front;
+  foot.element = surface_->element_of(search.uv);
+  foot.at = {search.uv.x(), search.uv.y(), 0.0};
   return foot;
 }
 
-SweptHit ParametricSurface::segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
+SweptHit ParametricView::first_touch(const Segment& motion, Sides sides) const noexcept {
   SweptHit hit;
-  if (radius <= 0.0) {
-    Crossing crossing(*this, motion, sides);
-    crossing.run(patches_);
-    if (!crossing.found) return hit;
-    hint.parametric = {identity_, crossing.uv};
-    const ParametricJet place = jet(crossing.uv);
-    const Vec3 front = normal(place);
-    hit.hit = true;
-    hit.t = crossing.t;
-    hit.contact.point = place.point;
-    hit.contact.normal = front.dot(motion.to - motion.from) > 0.0 ? Vec3(-front) : front;
-    hit.contact.distance = 0.0;
-    hit.contact.element = element_of(crossing.uv);
-    return hit;
-  }
-  // A ball goes on by as much as nothing is nearer.
-  constexpr int most_steps = 512;
-  const Vec3 way = motion.to - motion.from;
-  const double length = way.norm();
-  double t = 0.0;
-  for (int i = 0; i < most_steps; ++i) {
-    const Vec3 centre = motion.from + t * way;
-    const Foot foot = closest(centre, infinity, hint);
-    if (!foot.found()) return hit;
-    const double gap = foot.distance - radius;
-    const bool behind = sides == Sides::front && foot.normal.dot(normal(jet(hint.parametric.uv))) < 0.0;
-    const bool closing = foot.normal.dot(way) < 0.0;
-    double step = std::max(gap, 0.5 * skin_);
-    if (behind) {
-      step = std::max(foot.distance, 0.25 * radius);
-    } else if (gap <= skin_ && closing) {
-      hit.hit = true;
-      hit.t = t;
-      hit.contact = foot;
-      return hit;
-    }
-    if (!(length > 0.0) || t >= 1.0) return hit;
-    t = std::min(1.0, t + step / length);
-  }
-  // Along the surface, nearer to it than the steps can tell: it is there.
+  Crossing crossing(*surface_, motion, sides);
+  crossing.run(surface_->patches_);
+  if (!crossing.found) return hit;
+  const ParametricSpot there = spot(crossing.uv);
   hit.hit = true;
-  hit.t = t;
-  hit.contact = closest(motion.from + t * way, infinity, hint);
+  hit.t = crossing.t;
+  hit.side = there.front.dot(motion.to - motion.from) > 0.0 ? -1.0 : 1.0;
+  hit.contact.point = there.point;
+  hit.contact.normal = hit.side * there.front;
+  hit.contact.distance = 0.0;
+  hit.contact.element = surface_->element_of(crossing.uv);
+  hit.contact.at = {crossing.uv.x(), crossing.uv.y(), 0.0};
   return hit;
 }
 
-void ParametricSurface::contacts(const Vec3& position, double radius, Sides sides, Hint& hint,
-                                 ContactSet& out) const noexcept {
-  out.clear();
-  const double reach = radius + skin_;
-  const Foot nearest = closest(position, reach, hint);
-  if (!nearest.found()) return;
-  const auto add = [&](const Vec2& uv, const Foot& foot) {
-    if (sides == Sides::front && foot.normal.dot(normal(jet(uv))) < 0.0) return;
-    // One plane a direction.
-    constexpr double same_direction = 0.9999;
-    for (const Foot& other : out) {
-      if (other.normal.dot(foot.normal) > same_direction) return;
-    }
-    out.push_back(foot);
-  };
-  add(hint.parametric.uv, nearest);
-  // What else is as near: from every patch around, down to the nearest place.
-  constexpr int most_patches = 64;
-  int looked = 0;
-  double limit = reach;
-  const Patches patches(*this);
-  patches_.near(position, limit, [&](std::uint32_t column, std::uint32_t row) {
-    if (++looked > most_patches) {
-      limit = -1.0;
-      return;
-    }
-    ParametricDescent descent;
-    descent.uv = patches.leaf(column, row, patches_.count()).centre;
-    descent.jet = jet(descent.uv);
-    descent.goal = position;
-    descent.side = normal(descent.jet).dot(position - descent.jet.point) < 0.0 ? -1.0 : 1.0;
-    descent.may_leave = false;
-    if (descend(*this, descent) != DescentEnd::rest) return;
-    const Vec3 off = position - descent.jet.point;
-    const double distance = off.norm();
-    if (!(distance <= reach) || !(distance > 1e-3 * skin_)) return;
-    Foot foot;
-    foot.point = descent.jet.point;
-    foot.normal = off / distance;
-    foot.distance = distance;
-    foot.element = element_of(descent.uv);
-    add(descent.uv, foot);
-  });
-}
-
-FieldSample ParametricSurface::eval(const Vec3& p, Hint& hint) const noexcept {
+FieldSample ParametricView::eval(const Vec3& p) const noexcept {
   FieldSample sample;
-  const Foot foot = closest(p, infinity, hint);
+  const Foot foot = nearest(p, infinity);
   if (!foot.found()) return sample;
-  const ParametricJet place = jet(hint.parametric.uv);
-  const double side = foot.normal.dot(normal(place)) < 0.0 ? -1.0 : 1.0;
+  const ParametricSpot there = spot(foot.at.head<2>());
+  const double side = foot.normal.dot(there.front) < 0.0 ? -1.0 : 1.0;
   sample.value = side * foot.distance;
   sample.gradient = side * foot.normal;
-  sample.height = place.height;
+  sample.height = there.height;
   sample.element = foot.element;
   return sample;
 }

@@ -10,6 +10,7 @@
 #include "asperity/core/rng.h"
 #include "asperity/core/units.h"
 #include "asperity/surface/detail/parametric_shapes.h"
+#include "asperity/surface/tangents.h"
 
 namespace asperity {
 
@@ -347,20 +348,9 @@ double ParametricSurface::clearance(const Vec2& uv, const Vec3& point) const noe
   shape.v += height * n.v;
   Vec3 du;
   Vec3 dv;
-  parameter_gradients(shape, du, dv);
+  parameter_gradients(shape.u, shape.v, du, dv);
   const Vec2 below = uv + Vec2(du.dot(off), dv.dot(off));
   return n.n.dot(off) + height - feature_heights(settings_, below).height;
-}
-
-void ParametricSurface::parameter_gradients(const ParametricJet& jet, Vec3& du, Vec3& dv) noexcept {
-  const Vec3 cross = jet.u.cross(jet.v);
-  const double square = cross.squaredNorm();
-  if (!(square > 0.0)) {
-    du = dv = Vec3::Zero();
-    return;
-  }
-  du = jet.v.cross(cross) / square;
-  dv = cross.cross(jet.u) / square;
 }
 
 double ParametricSurface::printed_rise(const Vec2& uv) const noexcept {
@@ -389,12 +379,7 @@ std::uint32_t ParametricSurface::element_of(const Vec2& uv) const noexcept {
 
 Mat3 ParametricSurface::shape_operator(const ParametricJet& jet) const noexcept {
   const Vec3 n = normal(jet);
-  Vec3 du;
-  Vec3 dv;
-  parameter_gradients(jet, du, dv);
-  const Vec3 across = n.dot(jet.uu) * du + n.dot(jet.uv) * dv;
-  const Vec3 along = n.dot(jet.uv) * du + n.dot(jet.vv) * dv;
-  return -(across * du.transpose() + along * dv.transpose());
+  return asperity::shape_operator(jet.u, jet.v, n.dot(jet.uu), n.dot(jet.uv), n.dot(jet.vv));
 }
 
 std::size_t ParametricSurface::memory_bytes() const noexcept {

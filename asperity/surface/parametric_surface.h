@@ -7,8 +7,8 @@
 
 #include "asperity/core/result.h"
 #include "asperity/field/surface_features.h"
+#include "asperity/geometry/contact.h"
 #include "asperity/surface/parametric_patches.h"
-#include "asperity/surface/surface.h"
 
 namespace asperity {
 
@@ -75,23 +75,16 @@ struct ParametricLimits {
   double highest = 0.0;
 };
 
+class ParametricView;
+
 /// Immutable; any number of threads. Its front is the side of S_u x S_v, outward for closed shapes.
 class ParametricSurface {
  public:
   /// Errors: bad_value naming the member; also where features reach farther than the surface bends. [build]
   static Result<ParametricSurface> build(const ParametricSettings& settings);
 
-  /// First touch of a moving ball with the surface. What a point passes is bounded patch by patch, so that nothing is
-  /// missed; a ball is led on by its distance from the surface. Under Sides::front a point meets what it comes to
-  /// against the front. [servo]
-  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
-  /// Planes at the nearest places of the surface within the radius and the skin. [servo]
-  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept;
-  /// Nearest point within `bound`, of the whole surface. [servo]
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept;
-  /// Distance from the nearest point, below 0 behind the front; beside the rim of an open surface it goes by the side
-  /// of the rim's tangent plane. [servo]
-  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  /// What is touched of it. [servo]
+  [[nodiscard]] ParametricView view() const noexcept;
   [[nodiscard]] double skin() const noexcept { return skin_; }
   [[nodiscard]] Box bounds() const noexcept { return bounds_; }
 
@@ -103,8 +96,6 @@ class ParametricSurface {
   /// Height (m) of a point, very near to the surface at `uv`, over the features that are below it; below 0 under them.
   /// [servo]
   [[nodiscard]] double clearance(const Vec2& uv, const Vec3& point) const noexcept;
-  /// Gradients of u and v along the surface (1/m): the contravariant basis. [servo]
-  static void parameter_gradients(const ParametricJet& jet, Vec3& du, Vec3& dv) noexcept;
   /// What the printed example adds to the gradient of the angle (per m, along +z): 1 / (3 r) on the ramp, which counts
   /// theta twice (erratum c); 0 on other shapes. [servo]
   [[nodiscard]] double printed_rise(const Vec2& uv) const noexcept;
@@ -134,6 +125,7 @@ class ParametricSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
+  friend class ParametricView;
   ParametricSurface() = default;
   Status measure();
   Status check_features() const;
@@ -153,7 +145,6 @@ class ParametricSurface {
   Box bounds_;
   std::uint64_t identity_ = 0;
 };
-static_assert(SurfaceQuery<ParametricSurface>);
 
 /// "plane", "cylinder", "sphere", "torus", "vase", "ramp". [any]
 const char* parametric_name(ParametricShape shape);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "asperity/surface/coat.h"
+#include "asperity/surface/face_place.h"
 #include "asperity/surface/shell.h"
 
 namespace asperity {
@@ -29,20 +30,21 @@ struct ReliefFrame {
 
 /// A point of the displaced surface x(u, v) = V + H N over one triangle, with its tangents (m).
 struct ReliefPoint {
-  Vec3 position = Vec3::Zero();
+  Vec3 point = Vec3::Zero();
   Vec3 along_u = Vec3::Zero();
   Vec3 along_v = Vec3::Zero();
-  Vec3 outward = Vec3::Zero();  ///< unit normal
-  HeightJet jet;                ///< of the height as rendered: stitched and lowered
-  /// Unit, outward. [servo]
-  [[nodiscard]] const Vec3& normal() const noexcept { return outward; }
+  Vec3 front = Vec3::Zero();  ///< unit normal, outward
+  HeightJet jet;              ///< of the height as rendered: stitched and lowered
 };
 
-/// Where a probe last was on a relief: a cache, like TrianglePatch.
-struct ReliefPlace {
-  ReliefFrame frame;
-  double u = 0.0;
-  double v = 0.0;
+/// A triangle and a place on it.
+using ReliefPlace = FacePlace<ReliefFrame>;
+
+/// The triangle that was asked about last, and the surface there.
+struct ReliefCache {
+  ReliefPlace place;
+  ReliefPoint spot;
+  bool evaluated = false;  ///< `spot` is that of `place`
 };
 
 }  // namespace asperity

@@ -83,16 +83,16 @@ HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) 
 }
 
 ReliefPoint ReliefSurface::point(const ReliefFrame& frame, double u, double v) const noexcept {
-  ReliefPoint point;
-  point.jet = height(frame, u, v);
+  ReliefPoint spot;
+  spot.jet = height(frame, u, v);
   const Vec3 direction = frame.prism.direction_at(u, v);
-  point.position = frame.prism.base_at(u, v) + point.jet.height * direction;
-  point.along_u = frame.prism.edge_u + point.jet.u * direction + point.jet.height * frame.prism.turn_u;
-  point.along_v = frame.prism.edge_v + point.jet.v * direction + point.jet.height * frame.prism.turn_v;
-  point.outward = point.along_u.cross(point.along_v);
-  const double size = point.outward.norm();
-  if (size > 0.0) point.outward /= size;
-  return point;
+  spot.point = frame.prism.base_at(u, v) + spot.jet.height * direction;
+  spot.along_u = frame.prism.edge_u + spot.jet.u * direction + spot.jet.height * frame.prism.turn_u;
+  spot.along_v = frame.prism.edge_v + spot.jet.v * direction + spot.jet.height * frame.prism.turn_v;
+  spot.front = spot.along_u.cross(spot.along_v);
+  const double size = spot.front.norm();
+  if (size > 0.0) spot.front /= size;
+  return spot;
 }
 
 HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept {
@@ -175,35 +175,35 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
   return all;
 }
 
-bool ReliefSurface::locate(const Vec3& p, Hint& hint, ReliefFrame& frame, ShellPlace& place) const noexcept {
+bool ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
+                           ShellPlace& place) const noexcept {
   constexpr int most_walks = 24;
   constexpr double inside = -1e-10;
-  const Foot foot = base_.closest(p, infinity, hint);
+  const Foot foot = base_.index().closest(p, infinity, cache.patch);
   if (!foot.found()) return false;
   const TriangleMesh& mesh = base_.mesh();
   std::uint32_t face = foot.element;
-  place = {foot.barycentric[1], foot.barycentric[2], 0.0};
+  place = {foot.at[1], foot.at[2], 0.0};
   const double above = mesh.face_normal(face).dot(p - foot.point);
   place.height = std::copysign(foot.distance, above);
   for (int walk = 0; walk < most_walks; ++walk) {
-    if (!holds(hint.relief.frame, face, hint.moment)) {
-      // A place of its own, whatever comes of the search.
-      hint.relief = {this->frame(face, hint.moment), 1.0 / 3.0, 1.0 / 3.0};
+    ReliefCache& last = cache.relief;
+    if (!holds(last.place.frame, face, moment)) {
+      last.place.frame = this->frame(face, moment);
+      last.evaluated = false;
     }
-    const ShellPrism& prism = hint.relief.frame.prism;
+    const ShellPrism& prism = last.place.frame.prism;
     if (!prism.invert(p, place) && !prism.invert_anew(p, place)) return false;
     const Vec3 barycentric = place.barycentric();
     int out = 0;
     if (barycentric.minCoeff(&out) >= inside) {
-      frame = hint.relief.frame;
-      hint.relief.u = place.u;
-      hint.relief.v = place.v;
+      frame = last.place.frame;
       return true;
     }
     const std::uint32_t other = mesh.neighbour(face, (out + 1) % 3);
     if (other == no_index) return false;
     // Guess: the same height over the common edge.
-    const Vec3 edge = hint.relief.frame.prism.base_at(place.u, place.v);
+    const Vec3 edge = prism.base_at(place.u, place.v);
     face = other;
     const Vec3 guess = barycentric_frame(mesh, face).coordinates(edge);
     place.u = guess[1];
@@ -229,16 +229,16 @@ FieldSample ReliefSurface::field(const ReliefFrame& frame, const ShellPlace& pla
           frame.face};
 }
 
-FieldSample ReliefSurface::eval(const Vec3& p, Hint& hint) const noexcept {
+FieldSample ReliefSurface::eval(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment) const noexcept {
   ReliefFrame owner;
   ShellPlace place;
-  if (locate(p, hint, owner, place)) return field(owner, place);
-  const Foot nearest = base_.closest(p, infinity, hint);
+  if (locate(p, cache, moment, owner, place)) return field(owner, place);
+  const Foot nearest = base_.index().closest(p, infinity, cache.patch);
   FieldSample sample;
   if (!nearest.found()) return sample;
   const TriangleMesh& mesh = base_.mesh();
-  const bool outside = (p - nearest.point).dot(pseudonormal(mesh, nearest.element, nearest.barycentric)) >= 0.0;
-  const CoatSample coat = coat_sample(nearest.element, nearest.barycentric, hint.moment);
+  const bool outside = (p - nearest.point).dot(pseudonormal(mesh, nearest.element, nearest.at)) >= 0.0;
+  const CoatSample coat = coat_sample(nearest.element, nearest.at, moment);
   sample.gradient = outside ? nearest.normal : Vec3(-nearest.normal);
   if (nearest.distance == 0.0) sample.gradient = mesh.face_normal(nearest.element);
   sample.gradient -= coat.gradient;

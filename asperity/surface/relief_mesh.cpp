@@ -91,7 +91,7 @@ class Tessellation {
   std::uint32_t add(const ReliefFrame& frame, std::uint32_t i, std::uint32_t j) {
     const std::uint32_t id = number(frame.face, i, j);
     const Vec2 at = grid_place(static_cast<int>(i), static_cast<int>(j), static_cast<int>(parts_));
-    sums_[id] += surface_.point(frame, at.x(), at.y()).position;
+    sums_[id] += surface_.point(frame, at.x(), at.y()).point;
     ++faces_[id];
     return id;
   }

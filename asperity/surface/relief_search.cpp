@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/surface/relief_descent.h"
-#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/relief_view.h"
 
 namespace asperity {
 
@@ -276,22 +275,18 @@ class ReliefNearestSearch {
   [[nodiscard]] double distance() const noexcept { return distance_; }
   [[nodiscard]] bool found() const noexcept { return place_.frame.face != no_index; }
   [[nodiscard]] const ReliefPlace& place() const noexcept { return place_; }
-  [[nodiscard]] const ReliefPoint& point() const noexcept { return point_; }
+  [[nodiscard]] const ReliefPoint& spot() const noexcept { return spot_; }
 
   /// Starts a descent from a place, and keeps where it ends if that is nearer than all before.
   void descend_from(const ReliefPlace& place) noexcept {
     ReliefPlace at = place;
-    Descent descent;
-    descent.place = &at;
-    descent.goal = p_;
-    descent.may_leave = false;
-    descent.point = surface_.point(at.frame, at.u, at.v);
-    descend(surface_, descent);
-    const double now = (descent.point.position - p_).norm();
+    ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
+    descend(surface_, at, spot, 1.0, {.point = p_, .may_leave = false});
+    const double now = (spot.point - p_).norm();
     if (now > distance_ || (now == distance_ && found())) return;
     distance_ = now;
     place_ = at;
-    point_ = descent.point;
+    spot_ = spot;
   }
 
   void visit(std::uint32_t face) noexcept {
@@ -310,7 +305,7 @@ class ReliefNearestSearch {
         const Vec2 middle = (part.corner[0] + part.corner[1] + part.corner[2]) / 3.0;
         here.u = middle.x();
         here.v = middle.y();
-        const double now = (surface_.point(here.frame, here.u, here.v).position - p_).norm();
+        const double now = (surface_.point(here.frame, here.u, here.v).point - p_).norm();
         // Before anything is found every leaf that may reach into the bound is tried; after that, a leaf this small
         // whose middle is no nearer lies on the way of a descent that was made already.
         const double slack = found() ? std::min(0.5, part.radius / std::max(distance_, part.radius)) : 2.0;
@@ -368,33 +363,33 @@ class ReliefNearestSearch {
   CoatMoment moment_;
   double distance_;
   ReliefPlace place_;
-  ReliefPoint point_;
+  ReliefPoint spot_;
 };
 
-Foot foot_at(const ReliefPlace& place, const ReliefPoint& point, const Vec3& p) noexcept {
+Foot foot_at(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& p) noexcept {
   Foot foot;
-  foot.point = point.position;
-  foot.distance = (p - point.position).norm();
+  foot.point = spot.point;
+  foot.distance = (p - spot.point).norm();
   foot.element = place.frame.face;
-  foot.barycentric = {1.0 - place.u - place.v, place.u, place.v};
-  foot.normal = point.normal();
-  if (foot.normal.dot(p - point.position) < 0.0) foot.normal = -foot.normal;
+  foot.at = {1.0 - place.u - place.v, place.u, place.v};
+  foot.normal = spot.front;
+  if (foot.normal.dot(p - spot.point) < 0.0) foot.normal = -foot.normal;
   return foot;
 }
 
 }  // namespace
 
 template <class Skip>
-SweptHit ReliefSurface::first_met(const Segment& motion, Sides sides, Hint& hint, const Skip& skip) const noexcept {
+SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept {
   SweptHit best;
   const Vec3 way = motion.to - motion.from;
   if (!(way.squaredNorm() > 0.0)) return best;
   ReliefPlace place;
   // Nearly all motions are far shorter than a face: the neighbourhood decides.
-  base_.index().for_each_along(motion, reach_, [&](std::uint32_t face) {
+  surface_->base().index().for_each_along(motion, surface_->reach(), [&](std::uint32_t face) {
     if (skip(face)) return best.t;
-    const ReliefFrame here = frame(face, hint.moment);
-    const PatchHit hit = PatchRay(*this, here, motion, sides).first(best.t);
+    const ReliefFrame here = surface_->frame(face, moment_);
+    const PatchHit hit = PatchRay(*surface_, here, motion, sides).first(best.t);
     if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
       best.hit = true;
       best.t = hit.t;
@@ -404,71 +399,48 @@ SweptHit ReliefSurface::first_met(const Segment& motion, Sides sides, Hint& hint
     return best.t;
   });
   if (!best.hit) return best;
-  const ReliefPoint touched = point(place.frame, place.u, place.v);
-  best.contact = foot_at(place, touched, motion.from);
-  best.contact.normal = touched.normal();
-  if (best.contact.normal.dot(way) > 0.0) best.contact.normal = -best.contact.normal;
-  best.contact.point = touched.position;
+  const ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
+  best.contact = foot_at(place, spot, motion.from);
+  best.side = spot.front.dot(way) > 0.0 ? -1.0 : 1.0;
+  best.contact.normal = best.side * spot.front;
   best.contact.distance = 0.0;
-  hint.relief = place;
+  cache_->relief = {place, spot, true};
   return best;
 }
 
-SweptHit ReliefSurface::segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
-  if (radius > 0.0) return ball_segment(motion, radius, sides, hint);
-  return first_met(motion, sides, hint, [](std::uint32_t) { return false; });
+SweptHit ReliefView::first_touch(const Segment& motion, Sides sides) const noexcept {
+  return first_met(motion, sides, [](std::uint32_t) { return false; });
 }
 
-SweptHit ReliefSurface::segment_elsewhere(const Segment& motion, Sides sides, std::uint32_t from_face,
-                                          std::uint32_t to_face, Hint& hint) const noexcept {
-  const auto triangles = base_.mesh().triangles();
-  return first_met(motion, sides, hint, [&](std::uint32_t face) {
-    return share_vertex(triangles[face], triangles[from_face]) || share_vertex(triangles[face], triangles[to_face]);
+SweptHit ReliefView::between(const Place& from, const ReliefPoint& start, const Place& to, const ReliefPoint& end,
+                             Sides sides) const noexcept {
+  if (!surface_->overlapped(from.element) && !surface_->overlapped(to.element)) return {};
+  const Segment moved{start.point + from.side() * skin() * start.front, end.point + skin() * (to.side() * end.front)};
+  const auto triangles = surface_->base().mesh().triangles();
+  return first_met(moved, sides, [&](std::uint32_t face) {
+    return share_vertex(triangles[face], triangles[from.element]) ||
+           share_vertex(triangles[face], triangles[to.element]);
   });
 }
 
-SweptHit ReliefSurface::ball_segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept {
-  // The centre's own way first: nothing may pass it whole.
-  SweptHit centre = segment(motion, 0.0, sides, hint);
-  const Vec3 way = motion.to - motion.from;
-  const double length = way.norm();
-  const double end = centre.hit ? centre.t : 1.0;
-  double from = 0.0;
-  constexpr int most_steps = 4096;
-  for (int i = 0; i < most_steps && from < end; ++i) {
-    const Vec3 at = motion.from + from * way;
-    const Foot near = closest(at, infinity, hint);
-    const double gap = near.distance - radius;
-    if (gap <= skin_ && near.normal.dot(way) < 0.0) return {true, from, near};
-    // Nothing is nearer than the gap; where the ball already touches, half a radius on.
-    from += std::max(gap, 0.5 * radius * (gap <= skin_ ? 1.0 : 0.0) + skin_) / length;
-  }
-  if (!centre.hit) return {};
-  return centre;
-}
-
-void ReliefSurface::contacts(const Vec3& position, double radius, Sides, Hint& hint, ContactSet& out) const noexcept {
-  const Foot foot = closest(position, radius + 2.0 * skin(), hint);
-  if (foot.found()) out.push_back(foot);
-}
-
-Foot ReliefSurface::closest(const Vec3& p, double bound, Hint& hint) const noexcept {
-  ReliefNearestSearch search(*this, p, bound, hint.moment);
-  const ReliefPlace& last = hint.relief;
-  if (holds(last.frame, last.frame.face, hint.moment)) search.descend_from(last);
+Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
+  const MeshSurface& base = surface_->base();
+  ReliefNearestSearch search(*surface_, p, bound, moment_);
+  if (start.element < base.mesh().triangles().size())
+    search.descend_from({frame(start.element), start.at[1], start.at[2]});
   if (!search.found() && bound == infinity) {
-    const Foot base = base_.closest(p, infinity, hint);
-    if (!base.found()) return {};
-    search.descend_from({frame(base.element, hint.moment), base.barycentric[1], base.barycentric[2]});
+    const Foot under = base.index().closest(p, infinity, cache_->patch);
+    if (!under.found()) return {};
+    search.descend_from({surface_->frame(under.element, moment_), under.at[1], under.at[2]});
   }
   if (search.distance() == infinity) return {};
   Box around;
   around.include(p);
-  base_.index().for_each_in_box(around.grown(search.distance() + reach_),
-                                [&](std::uint32_t face) { search.visit(face); });
+  base.index().for_each_in_box(around.grown(search.distance() + surface_->reach()),
+                               [&](std::uint32_t face) { search.visit(face); });
   if (!search.found()) return {};
-  hint.relief = search.place();
-  return foot_at(search.place(), search.point(), p);
+  cache_->relief = {search.place(), search.spot(), true};
+  return foot_at(search.place(), search.spot(), p);
 }
 
 }  // namespace asperity

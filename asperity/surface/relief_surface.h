@@ -12,6 +12,8 @@
 
 namespace asperity {
 
+class ReliefView;
+
 /// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
 enum class OnOverlap {
   cure,    ///< turn the directions where that helps, then lower the relief around the vertices at fault, and report it
@@ -47,9 +49,9 @@ struct ReliefReport {
 /// A base mesh that wears a coat of relief: the displaced surface x = V + H N itself (formulation D2, D3).
 ///
 /// Over each triangle x is a smooth function of the barycentric coordinates; neighbours share directions and, through
-/// stitching, heights, so that the surface is closed wherever the base is. All queries are about that surface. On an
-/// open base the relief ends at the rim. A coat may have levels of detail and change with time: queries are about the
-/// moment that the hint tells.
+/// stitching, heights, so that the surface is closed wherever the base is. All queries are about that surface, at one
+/// moment of its coat, which may have levels of detail and change with time (ReliefView). On an open base the relief
+/// ends at the rim.
 class ReliefSurface {
  public:
   /// Errors: mismatch (a coat that was laid on another mesh than the base's), bad_mesh (a relief that folds over, when
@@ -69,25 +71,17 @@ class ReliefSurface {
   [[nodiscard]] CoatSample coat_sample(std::uint32_t face, const Vec3& barycentric,
                                        const CoatMoment& moment = {}) const noexcept;
 
-  /// First point of a motion where a ball of `radius` touches. A point's is exact: no relief, however thin, is stepped
-  /// over. A ball moves in steps of half its radius, each checked at its end. [servo]
-  [[nodiscard]] SweptHit segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
-  /// The same for a point that slides on the relief from one face to another: what belongs to these faces, or shares a
-  /// vertex with one of them, is not met. For folds that overlap in space. [servo]
-  [[nodiscard]] SweptHit segment_elsewhere(const Segment& motion, Sides sides, std::uint32_t from_face,
-                                           std::uint32_t to_face, Hint& hint) const noexcept;
-  void contacts(const Vec3& position, double radius, Sides sides, Hint& hint, ContactSet& out) const noexcept;
-  /// The nearest point of the displaced surface. `normal` is that of the surface, turned towards p. [servo]
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint& hint) const noexcept;
+  /// What is touched of it at a moment of its coat. [servo]
+  [[nodiscard]] ReliefView view(SurfaceCache& cache, const CoatMoment& moment = {}) const noexcept;
   /// Phi = h - H in shell coordinates, blended where faces are stitched, and its gradient. Not a distance: its gradient
   /// is as long as the relief is steep. Where the shell does not reach, the nearest base point's own. [servo]
-  [[nodiscard]] FieldSample eval(const Vec3& p, Hint& hint) const noexcept;
+  [[nodiscard]] FieldSample eval(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment = {}) const noexcept;
   [[nodiscard]] double skin() const noexcept { return skin_; }
   [[nodiscard]] Box bounds() const noexcept { return base_.bounds().grown(reach_); }
 
   /// What evaluating the relief over `face` needs. [servo]
   [[nodiscard]] ReliefFrame frame(std::uint32_t face, const CoatMoment& moment = {}) const noexcept;
-  /// Tells reliefs apart, never 0: whose places and frames a hint holds. [any]
+  /// Tells reliefs apart, never 0: whose frames a cache holds. [any]
   [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
   /// Whether a frame is this surface's own, of the face and the moment. [servo]
   [[nodiscard]] bool holds(const ReliefFrame& frame, std::uint32_t face, const CoatMoment& moment) const noexcept {
@@ -101,7 +95,8 @@ class ReliefSurface {
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
   /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. False where no
   /// prism holds p. [servo]
-  [[nodiscard]] bool locate(const Vec3& p, Hint& hint, ReliefFrame& frame, ShellPlace& place) const noexcept;
+  [[nodiscard]] bool locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
+                            ShellPlace& place) const noexcept;
   /// Value and gradient of Phi at a located place. [servo]
   [[nodiscard]] FieldSample field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   /// Value and gradient of h - H with the face's own height, not stitched (Algorithm 1). [servo]
@@ -116,7 +111,9 @@ class ReliefSurface {
   [[nodiscard]] double grain() const noexcept { return grain_; }
   /// Whether heights of neighbouring faces may differ at their edge (no blend was asked for). [any]
   [[nodiscard]] bool has_jumps() const noexcept { return coat_.has_seams() && bands_.empty(); }
-  /// Whether the relief of a face without a common vertex comes into that of `face`. [servo]
+  /// Whether reliefs of faces without a common vertex come into one another anywhere; and into that of `face`. [servo]
+  [[nodiscard]] bool overlaps() const noexcept { return report_.overlapping_pairs > 0; }
+  /// [servo]
   [[nodiscard]] bool overlapped(std::uint32_t face) const noexcept {
     return !overlapped_.empty() && overlapped_[face] != 0;
   }
@@ -129,12 +126,9 @@ class ReliefSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
-  [[nodiscard]] SweptHit ball_segment(const Segment& motion, double radius, Sides sides, Hint& hint) const noexcept;
   ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest);
   /// Does what the settings ask beyond the default.
   Status settle(const ReliefSettings& settings);
-  template <class Skip>
-  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, Hint& hint, const Skip& skip) const noexcept;
   void fit(ShellDirections directions);
   void lay_bands();
   /// Per face: of the heights over it, the share that its prism has room for.
@@ -169,7 +163,6 @@ class ReliefSurface {
   double grain_ = 0.0;
   double fold_depth_ = 0.0;  ///< by how much rounding folds may move the surface (m)
 };
-static_assert(SurfaceQuery<ReliefSurface> && HasPrisms<ReliefSurface>);
 
 /// Lays a coat of these parts on a mesh and makes the relief of both. The mesh is named once, so the coat can be on no
 /// other than the one it is touched with. Errors: those of Coat::build, then those of ReliefSurface::build. [build]

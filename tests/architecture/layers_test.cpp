@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "tests/architecture/source_tree.h"
 
@@ -44,26 +47,40 @@ TEST(Layers, ModulesIncludeOnlyModulesAboveThem) {
   }
 }
 
+// Folders whose headers are their module's own.
+const std::vector<std::string> own_folders = {"/detail/", "/render/contact/", "/render/laws/", "/render/stages/"};
+
+/// Where the own folder begins in a header's path; npos where it is in none.
+std::size_t own_folder_in(const std::string& header) {
+  std::size_t first = std::string::npos;
+  for (const std::string& folder : own_folders) {
+    const std::size_t at = header.find(folder);
+    if (at != std::string::npos) first = std::min(first, folder == "/detail/" ? at : at + folder.find('/', 1));
+  }
+  return first;
+}
+
 /// What cmake/AsperityInstall.cmake takes along of the headers below asperity/.
 bool is_installed(const std::string& header) {
-  const std::vector<std::string> left_out = {"/detail/", "/io/vdb/", "/io/vtk/", "/study/nlopt/"};
-  return std::none_of(left_out.begin(), left_out.end(),
+  const std::vector<std::string> left_out = {"/io/vdb/", "/io/vtk/", "/study/nlopt/"};
+  return own_folder_in(header) == std::string::npos &&
+         std::none_of(left_out.begin(), left_out.end(),
                       [&](const std::string& folder) { return header.find(folder) != std::string::npos; });
 }
 
-// Headers in detail/ are not installed: an installed one that includes them would not compile.
-TEST(Layers, DetailIsTheModulesOwn) {
+// Headers in a module's own folders are not installed: an installed one that includes them would not compile.
+TEST(Layers, OwnFoldersAreTheModulesOwn) {
   int seen = 0;
   for (const SourceFile& file : files_below("", {".h", ".cpp"})) {
     const bool of_a_module = file.path.compare(0, 9, "asperity/") == 0;
     const bool of_tests = file.path.compare(0, 6, "tests/") == 0;
     for (std::size_t i = 0; i < file.lines.size(); ++i) {
       const std::string name = included(file.lines[i]);
-      const std::size_t detail = name.find("/detail/");
-      if (detail == std::string::npos || name.front() != '"') continue;
+      const std::size_t own = own_folder_in(name);
+      if (own == std::string::npos || name.front() != '"') continue;
       ++seen;
       if (of_tests) continue;
-      const std::string folder = name.substr(1, detail);  // "asperity/MODULE/"
+      const std::string folder = name.substr(1, own);  // "asperity/MODULE/"
       EXPECT_TRUE(of_a_module && file.path.compare(0, folder.size(), folder) == 0)
           << file.path << ":" << i + 1 << ": " << name << " is another module's own";
       const bool is_public = file.path.ends_with(".h") && is_installed(file.path);
@@ -71,6 +88,67 @@ TEST(Layers, DetailIsTheModulesOwn) {
     }
   }
   EXPECT_GT(seen, 40);
+}
+
+/// Units, a header and its source, by their path without ending, and which others each includes.
+using Includes = std::map<std::string, std::set<std::string>>;
+
+Includes includes_within(const std::string& module) {
+  const auto unit = [](const std::string& path) { return path.substr(0, path.rfind('.')); };
+  Includes all;
+  for (const SourceFile& file : files_below("asperity/" + module + "/", {".h", ".cpp"})) {
+    std::set<std::string>& others = all[unit(file.path)];
+    for (const std::string& line : file.lines) {
+      const std::string name = included(line);
+      if (name.empty() || name.front() != '"' || module_of(name.substr(1)) != module) continue;
+      if (const std::string other = unit(name.substr(1)); other != unit(file.path)) others.insert(other);
+    }
+  }
+  return all;
+}
+
+/// Strongly connected components of more than one unit, each sorted.
+std::set<std::vector<std::string>> circles(const Includes& includes) {
+  const auto reached_from = [&](const std::string& start) {
+    std::set<std::string> reached;
+    std::vector<std::string> open{start};
+    while (!open.empty()) {
+      const auto at = includes.find(open.back());
+      open.pop_back();
+      if (at == includes.end()) continue;
+      for (const std::string& other : at->second) {
+        if (reached.insert(other).second) open.push_back(other);
+      }
+    }
+    return reached;
+  };
+  std::map<std::string, std::set<std::string>> reach;
+  for (const auto& [unit, others] : includes) reach[unit] = reached_from(unit);
+  std::set<std::vector<std::string>> found;
+  for (const auto& [unit, there] : reach) {
+    std::vector<std::string> circle{unit};
+    for (const std::string& other : there) {
+      if (other != unit && reach[other].count(unit) > 0) circle.push_back(other);
+    }
+    std::sort(circle.begin(), circle.end());
+    if (circle.size() > 1) found.insert(circle);
+  }
+  return found;
+}
+
+TEST(Layers, RenderHasNoIncludeCircle) {
+  const Includes render = includes_within("render");
+  EXPECT_GT(render.size(), 30U);
+  for (const std::vector<std::string>& circle : circles(render)) {
+    std::string units;
+    for (const std::string& unit : circle) units += " " + unit;
+    ADD_FAILURE() << "these include one another:" << units;
+  }
+}
+
+TEST(Layers, AnIncludeCircleIsSeen) {
+  const Includes some = {{"a", {"b"}}, {"b", {"c"}}, {"c", {"a", "d"}}, {"d", {"e"}}, {"e", {}}, {"f", {"a"}}};
+  EXPECT_EQ(circles(some), (std::set<std::vector<std::string>>{{"a", "b", "c"}}));
 }
 
 TEST(Layers, TheUmbrellaIncludesEveryPublicHeaderUpToIo) {

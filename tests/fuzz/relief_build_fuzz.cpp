@@ -7,7 +7,7 @@
 #include <cstring>
 #include <memory>
 
-#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/relief_view.h"
 #include "tests/fuzz/fuzz_driver.h"
 
 namespace {
@@ -107,7 +107,7 @@ void check_relief(const ReliefSurface& surface, Bytes& bytes) {
       for (const double v : {0.0, 0.02, 0.3, 0.7, 1.0}) {
         if (u + v > 1.0) continue;
         const ReliefPoint point = surface.point(frame, u, v);
-        require(point.position.allFinite(), "points are finite");
+        require(point.point.allFinite(), "points are finite");
         require(std::isfinite(point.jet.u) && std::isfinite(point.jet.v), "slopes are finite");
         if (point.jet.height < range.lowest - slack || point.jet.height > range.highest + slack) {
           const CoatSettings& coat = surface.coat().settings();
@@ -120,25 +120,25 @@ void check_relief(const ReliefSurface& surface, Bytes& bytes) {
         }
         require(point.jet.height >= range.lowest - slack && point.jet.height <= range.highest + slack,
                 "heights stay in their range");
-        require((point.position.array() >= bounds.lower.array()).all() &&
-                    (point.position.array() <= bounds.upper.array()).all(),
-                "points stay in the bounds");
+        require(
+            (point.point.array() >= bounds.lower.array()).all() && (point.point.array() <= bounds.upper.array()).all(),
+            "points stay in the bounds");
       }
     }
   }
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 8; ++i) {
     const double x = 2.0 * bytes.coordinate();
     const double y = 2.0 * bytes.coordinate();
     const Vec3 from(x, y, 2.0 * bytes.coordinate());
     const double to_x = 2.0 * bytes.coordinate();
     const Vec3 to(to_x, 2.0 * bytes.coordinate(), 2.0 * bytes.coordinate());
-    const SweptHit hit = surface.segment({from, to}, 0.0, i % 2 == 0 ? Sides::both : Sides::front, hint);
+    const SweptHit hit = surface.view(cache).first_touch({from, to}, i % 2 == 0 ? Sides::both : Sides::front);
     require(!hit.hit || (hit.t >= 0.0 && hit.t <= 1.0 && hit.contact.element < mesh.triangles().size()),
             "a hit lies on the way");
-    const Foot foot = surface.closest(from, infinity, hint);
+    const Foot foot = surface.view(cache).nearest(from, infinity);
     require(foot.found() && std::isfinite(foot.distance), "there is always a nearest point");
-    const FieldSample sample = surface.eval(from, hint);
+    const FieldSample sample = surface.eval(from, cache);
     require(!std::isnan(sample.value), "the field is a number");
   }
 }

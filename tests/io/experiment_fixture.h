@@ -78,12 +78,13 @@ class ExperimentTest : public ::testing::Test {
     Result<SafetyStage> safety = SafetyStage::build(SafetySettings::from_profile(experiment.device));
     EXPECT_TRUE(probe.ok() && safety.ok());
     ProxyState state;
+    ProxyCache cache;
     ForceHash hash;
     SessionSettings settings;
     settings.dt = Seconds(1.0 / experiment.rate);
     settings.max_ticks = ticks;
-    run_session([&](const ProbeSample& p, Seconds dt) { return step(experiment.scene, state, p, dt); }, *probe, *safety,
-                settings, [&](const TraceRecord& record) { hash.add(record); });
+    run_session([&](const ProbeSample& p, Seconds dt) { return step(experiment.scene, state, cache, p, dt); }, *probe,
+                *safety, settings, [&](const TraceRecord& record) { hash.add(record); });
     return hash.value();
   }
 

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "asperity/field/mesh_conversion.h"
+#include "asperity/render/law_registry.h"
 #include "tests/io/experiment_fixture.h"
 
 namespace asperity::experiment_scene_test {
@@ -248,13 +249,14 @@ TEST_F(ExperimentScene, BuiltinScenesReadAndTouch) {
     EXPECT_EQ(e.name, scene.name);
     // The hand meets the surface within the first second and a half of every scene.
     ProxyState state;
+    ProxyCache cache;
     bool touched = false;
     for (int tick = 0; tick < 1500; ++tick) {
       const StrokePose pose = e.path.pose(Seconds(tick * 1e-3));
       ProbeSample probe;
       probe.pose.position = pose.target;
       probe.twist.linear = pose.velocity;
-      const ForceSample force = step(e.scene, state, probe, Seconds(1e-3));
+      const ForceSample force = step(e.scene, state, cache, probe, Seconds(1e-3));
       EXPECT_TRUE(force.wrench.force.allFinite());
       touched = touched || force.flags.has(TickFlag::contact) || force.flags.has(TickFlag::field_force);
     }

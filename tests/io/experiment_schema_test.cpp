@@ -19,6 +19,7 @@
 #include "asperity/io/gltf_material.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/volume_io.h"
+#include "asperity/render/law_registry.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/io/experiment_fixture.h"
 

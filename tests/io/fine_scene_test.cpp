@@ -312,10 +312,18 @@ TEST_F(FineScene, GeometryIsRefusedWhereNothingCarriesIt) {
 
 /// Where a stroke's ray from above meets the surface.
 double height_at(const Instance& instance, double x, double z) {
-  Hint hint;
+  SurfaceCache cache;
   const Segment down{Vec3(x, 0.01, z), Vec3(x, -0.01, z)};
-  const auto hit =
-      std::visit([&](const auto& surface) { return surface->segment(down, 0.0, Sides::both, hint); }, instance.surface);
+  const auto touch = [&](const auto& view) { return view.first_touch(down, Sides::both); };
+  const auto hit = std::visit(
+      [&](const auto& surface) {
+        if constexpr (requires { surface->view(); }) {
+          return touch(surface->view());
+        } else {
+          return touch(surface->view(cache));
+        }
+      },
+      instance.surface);
   return 0.01 - 0.02 * hit.t;
 }
 
@@ -370,15 +378,15 @@ TEST_F(FineScene, GratingsAreBakedAroundAMesh) {
   ASSERT_TRUE(std::holds_alternative<std::shared_ptr<const ReliefSurface>>(instance(e).surface));
   const auto& ball = *std::get<std::shared_ptr<const ReliefSurface>>(instance(e).surface);
   const MeshSurface& base = *base_of(instance(e).surface);
-  Hint hint;
-  Hint bare;
+  SurfaceCache cache;
+  SurfaceCache bare;
   double largest = 0.0;
   for (int i = 0; i < 144; ++i) {
     const double angle = 2.0 * pi * (i + 0.5) / 144.0;
     const Vec3 out(std::cos(angle), 0.0, -std::sin(angle));
     const Segment ray{0.05 * out, 0.03 * out};
-    const double outer = 0.05 - 0.02 * ball.segment(ray, 0.0, Sides::both, hint).t;
-    const double inner = 0.05 - 0.02 * base.segment(ray, 0.0, Sides::both, bare).t;
+    const double outer = 0.05 - 0.02 * ball.view(cache).first_touch(ray, Sides::both).t;
+    const double inner = 0.05 - 0.02 * base.view(bare).first_touch(ray, Sides::both).t;
     largest = std::max(largest, std::abs(outer - inner - 1e-4 * std::cos(24.0 * angle)));
   }
   EXPECT_LT(largest, 1e-5);
@@ -561,6 +569,7 @@ TEST_F(FineScene, BuiltInScenesAreTouched) {
     EXPECT_EQ(e.name, name);
     const Seconds dt(2.0 / e.rate);
     ProxyState state;
+    ProxyCache cache;
     int touching = 0;
     int asked = 0;
     for (Seconds time{0.0}; time < e.path.contact_end() && asked < 400; time += dt) {
@@ -570,7 +579,7 @@ TEST_F(FineScene, BuiltInScenesAreTouched) {
       const bool pressed = e.path.normal_force() > 0.0 && pose.phase == StrokePhase::contact;
       probe.pose.position = pose.target - (pressed ? 5e-4 : 0.0) * pose.normal;
       probe.twist.linear = pose.velocity;
-      const ForceSample force = step(e.scene, state, probe, dt);
+      const ForceSample force = step(e.scene, state, cache, probe, dt);
       ASSERT_TRUE(force.wrench.force.allFinite()) << name;
       if (pose.phase != StrokePhase::contact) continue;
       ++asked;
@@ -585,6 +594,7 @@ TEST_F(FineScene, BuiltInScenesAreTouched) {
 template <class Visit>
 void follow(const Experiment& e, Visit&& visit) {
   ProxyState state;
+  ProxyCache cache;
   const Seconds begin = e.path.contact_begin();
   const Seconds span = e.path.contact_end() - begin;
   for (Seconds time{0.0}; time < e.path.contact_end(); time += Seconds(1.0 / e.rate)) {
@@ -592,7 +602,7 @@ void follow(const Experiment& e, Visit&& visit) {
     ProbeSample probe;
     probe.pose.position = pose.target;
     probe.twist.linear = pose.velocity;
-    const ForceSample force = step(e.scene, state, probe, Seconds(1.0 / e.rate));
+    const ForceSample force = step(e.scene, state, cache, probe, Seconds(1.0 / e.rate));
     if (time > begin) visit((time - begin) / span, pose, force);
   }
 }
@@ -637,6 +647,7 @@ TEST_F(FineScene, TheHandSticksAndSlips) {
     Result<SafetyStage> safety = SafetyStage::build(SafetySettings::from_profile(e.device));
     ASSERT_TRUE(device.ok() && safety.ok());
     ProxyState state;
+    ProxyCache cache;
     SessionSettings settings;
     settings.dt = Seconds(1.0 / e.rate);
     settings.max_ticks = 5000;
@@ -644,7 +655,7 @@ TEST_F(FineScene, TheHandSticksAndSlips) {
     double last = 0.0;
     std::vector<double> after_drop;
     const auto tick = [&](const ProbeSample& probe, Seconds dt) {
-      const ForceSample force = step(e.scene, state, probe, dt);
+      const ForceSample force = step(e.scene, state, cache, probe, dt);
       const double friction = force.parts.friction.norm();
       if (probe.time > e.path.contact_begin()) {
         most = std::max(most, friction);

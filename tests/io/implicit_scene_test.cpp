@@ -38,9 +38,9 @@ TEST_F(ImplicitScene, AMeshIsFeltThroughItsPotential) {
   EXPECT_TRUE(surface.grid().has_faces());
   ASSERT_NE(surface.mesh(), nullptr);
   EXPECT_EQ(e.scene.instances()[0].sides, Sides::front);
-  Hint hint;
-  EXPECT_NEAR(surface.eval(Vec3(0.0, 0.021, 0.004), hint).value, 0.001, 1e-7);
-  EXPECT_NEAR(surface.eval(Vec3(0.0, 0.018, 0.004), hint).value, -0.002, 1e-7);
+  SurfaceCache cache;
+  EXPECT_NEAR(surface.eval(Vec3(0.0, 0.021, 0.004), cache).value, 0.001, 1e-7);
+  EXPECT_NEAR(surface.eval(Vec3(0.0, 0.018, 0.004), cache).value, -0.002, 1e-7);
   // As deep as the device can press, and more.
   const double deepest = 1.5 * e.device.max_force / e.scene.instances()[0].material.stiffness;
   EXPECT_GE(surface.reach_inside(), deepest);
@@ -80,16 +80,16 @@ TEST_F(ImplicitScene, ACoatIsTheTextureOfThePotential) {
       R"({"surfaces":[{"mesh":{"generator":"box","size":[0.04,0.04,0.04]},"coat":{"height_map":{"generator":"H_2","size":64},
           "height":"0.4 mm","mapping":"triplanar","tile":"40 mm"}}]})");
   const auto& coat = **std::get_if<std::shared_ptr<const ReliefSurface>>(&relief.scene.instances()[0].surface);
-  Hint hint;
-  Hint other;
+  SurfaceCache cache;
+  SurfaceCache other;
   double largest = 0.0;
   double squares = 0.0;
   int samples = 0;
   for (double x = -0.012; x < 0.012; x += 0.0007) {
     for (double z = -0.012; z < 0.012; z += 0.0007) {
       const Segment down{Vec3(x, 0.025, z), Vec3(x, 0.015, z)};
-      const SweptHit here = surface.segment(down, 0.0, Sides::front, hint);
-      const SweptHit there = coat.segment(down, 0.0, Sides::front, other);
+      const SweptHit here = surface.view(cache).first_touch(down, Sides::front);
+      const SweptHit there = coat.view(other).first_touch(down, Sides::front);
       ASSERT_TRUE(here.hit && there.hit);
       const double off = 0.01 * (here.t - there.t);
       largest = std::max(largest, std::abs(off));
@@ -105,12 +105,12 @@ TEST_F(ImplicitScene, NoiseIsOfTheAmplitudeAskedFor) {
   const Experiment e = good(
       box(R"({"resolution":80,"redistance":"none","texture":{"amplitude":"0.3 mm","wavelength":"6 mm","seed":7}})"));
   const ImplicitSurface& surface = implicit(e);
-  Hint hint;
+  SurfaceCache cache;
   double low = 0.0;
   double high = 0.0;
   for (double x = -0.015; x < 0.015; x += 0.0005) {
     for (double z = -0.015; z < 0.015; z += 0.0005) {
-      const SweptHit hit = surface.segment({Vec3(x, 0.025, z), Vec3(x, 0.015, z)}, 0.0, Sides::front, hint);
+      const SweptHit hit = surface.view(cache).first_touch({Vec3(x, 0.025, z), Vec3(x, 0.015, z)}, Sides::front);
       ASSERT_TRUE(hit.hit);
       low = std::min(low, hit.contact.point.y() - 0.02);
       high = std::max(high, hit.contact.point.y() - 0.02);
@@ -144,10 +144,10 @@ TEST_F(ImplicitScene, AFileIsReadInPlaceOfTheConversion) {
   // Alone, in metres as it was written.
   const Experiment alone = good(R"({"surfaces":[{"implicit":{"file":"made.vdb"},"units":"m"}]})");
   EXPECT_EQ(implicit(alone).mesh(), nullptr);
-  Hint hint;
-  Hint other;
+  SurfaceCache cache;
+  SurfaceCache other;
   for (const Vec3& p : {Vec3(0.0, 0.0295, 0.0), Vec3(0.02, 0.02, 0.001), Vec3(-0.031, 0.0, 0.0)}) {
-    EXPECT_NEAR(implicit(alone).eval(p, hint).value, implicit(made).eval(p, other).value, 1e-8);
+    EXPECT_NEAR(implicit(alone).eval(p, cache).value, implicit(made).eval(p, other).value, 1e-8);
   }
   // Fitted to another size, as other files are.
   const Experiment larger = good(R"({"surfaces":[{"implicit":{"file":"made.vdb"},"fit":"120 mm"}]})");
@@ -163,11 +163,11 @@ TEST_F(ImplicitScene, AFileIsReadInPlaceOfTheConversion) {
 TEST_F(ImplicitScene, OpenSheetsGetAShellAndSaySo) {
   const Experiment e = good(R"({"surfaces":[{"mesh":"sheet.obj","fit":"80 mm","implicit":{"resolution":80}}]})");
   EXPECT_TRUE(noted(e, "shell"));
-  Hint hint;
-  const double above = implicit(e).eval(Vec3(0.0, 0.0, 0.002), hint).value;
-  const double below = implicit(e).eval(Vec3(0.0, 0.0, -0.002), hint).value;
+  SurfaceCache cache;
+  const double above = implicit(e).eval(Vec3(0.0, 0.0, 0.002), cache).value;
+  const double below = implicit(e).eval(Vec3(0.0, 0.0, -0.002), cache).value;
   EXPECT_NEAR(above, below, 1e-6);
-  EXPECT_LT(implicit(e).eval(Vec3(0.0, 0.0, 0.0), hint).value, 0.0);
+  EXPECT_LT(implicit(e).eval(Vec3(0.0, 0.0, 0.0), cache).value, 0.0);
 }
 
 struct Refused {

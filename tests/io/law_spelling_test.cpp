@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "asperity/io/detail/scene_reader.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity::law_spelling_test {
 namespace {

@@ -48,10 +48,10 @@ std::vector<Vec3> pressed_walk(const ReliefSurface& surface, double depth, doubl
   Vec3 p = point_on(mesh, face, Vec3::Constant(1.0 / 3.0));
   Vec3 heading = random_direction(rng);
   std::vector<Vec3> path{p + 5e-3 * mesh.face_normal(face)};
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < count; ++i) {
-    const Foot foot = surface.base().closest(p, infinity, hint);
-    const Vec3 normal = interpolated_normal(mesh, foot.element, foot.barycentric);
+    const Foot foot = surface.base().view(cache).nearest(p, infinity);
+    const Vec3 normal = interpolated_normal(mesh, foot.element, foot.at);
     path.emplace_back(foot.point - depth * normal);
     heading = (heading - heading.dot(normal) * normal).normalized();
     p = foot.point + step * heading;
@@ -120,30 +120,34 @@ TEST(RealInput, millions_of_ticks_under_the_rocky_bunny_are_never_stuck_nor_thro
   std::size_t lost = 0;
   std::size_t stuck = 0;
   std::size_t unfinished = 0;
-  Hint hint;
+  SurfaceCache cache;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     Rng rng(seed);
     std::uint32_t face = random_face(rng, mesh);
     Vec3 p = point_on(mesh, face, Vec3::Constant(1.0 / 3.0));
     Vec3 heading = random_direction(rng);
     ProxyState state;
-    touch(scene, state, p + 5e-3 * mesh.face_normal(face));
+    ProxyCache remembered;
+    const auto touched = [&](const Vec3& at) { return step(scene, state, remembered, probe_at(at), tick); };
+    touched(p + 5e-3 * mesh.face_normal(face));
     for (int i = 0; i < 100000; ++i) {
-      const Foot foot = surface->base().closest(p, infinity, hint);
-      const Vec3 normal = interpolated_normal(mesh, foot.element, foot.barycentric);
+      const Foot foot = surface->base().view(cache).nearest(p, infinity);
+      const Vec3 normal = interpolated_normal(mesh, foot.element, foot.at);
       const Vec3 probe = foot.point - depth * normal;
-      const ForceSample felt = touch(scene, state, probe);
+      const ForceSample felt = touched(probe);
       heading = (heading - heading.dot(normal) * normal).normalized();
       p = foot.point + 2e-5 * heading;
       lost += felt.flags.has(TickFlag::contact) ? 0U : 1U;
       unfinished += felt.flags.has(TickFlag::not_converged) ? 1U : 0U;
       if (!felt.flags.has(TickFlag::contact) || felt.flags.has(TickFlag::not_converged)) continue;
       // At rest within a face the spring stands straight on the relief: nothing holds the proxy back.
-      const ContactState& contact = state.contacts[0];
-      const ReliefPlace& place = contact.hint.relief;
-      const bool inside = std::min({place.u, place.v, 1.0 - place.u - place.v}) > 1e-9;
+      const Contact& contact = state.contacts[0];
+      ASSERT_TRUE(contact.surface.rests && contact.first().known());
+      const Place place = contact.first();
+      const bool inside = place.at.minCoeff() > 1e-9;
+      const Vec3 front = surface->view(cache).at(place).front;
       const Vec3 spring = felt.proxy - probe;
-      stuck += inside && spring.cross(contact.point.normal()).norm() > 1e-3 * spring.norm() + 1e-7 ? 1U : 0U;
+      stuck += inside && spring.cross(front).norm() > 1e-3 * spring.norm() + 1e-7 ? 1U : 0U;
     }
   }
   EXPECT_EQ(lost, 0U);

@@ -99,13 +99,14 @@ TEST_F(ReliefScene, TheTipChoosesTheLevel) {
   const auto span = [&](const std::string& probe) {
     const Experiment e = good(scene(coat_keys, "", R"("probe":)" + probe));
     ProxyState state;
+    ProxyCache cache;
     double low = infinity;
     double high = -infinity;
     for (int i = 0; i < 1600; ++i) {
       ProbeSample sample;
       const double up = i < 100 ? 2e-3 - 2.5e-5 * i : -5e-4;
       sample.pose.position = Vec3(0.003, up, -0.03 + (i < 100 ? 0.0 : 4e-5 * (i - 100)));
-      const ForceSample force = step(e.scene, state, sample, Seconds(1e-3));
+      const ForceSample force = step(e.scene, state, cache, sample, Seconds(1e-3));
       if (i < 400) continue;
       low = std::min(low, force.proxy.y());
       high = std::max(high, force.proxy.y());

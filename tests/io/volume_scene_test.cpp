@@ -80,8 +80,8 @@ TEST_F(VolumeScene, UnitsFitAndPoseAreThoseOfMeshes) {
   EXPECT_EQ(fitted.scene.instances()[0].world_from_object.position.x(), 0.01);
   EXPECT_FALSE(has_note(fitted, "states no unit"));
   // The ball's surface is where it was put: radius 1.5 of a box of 6.
-  Hint hint;
-  const Foot foot = iso(fitted).closest(Vec3(0.03, 0.0, 0.0), 1.0, hint);
+  SurfaceCache cache;
+  const Foot foot = iso(fitted).view(cache).nearest(Vec3(0.03, 0.0, 0.0), 1.0);
   ASSERT_TRUE(foot.found());
   EXPECT_NEAR(foot.point.x(), 0.02, 0.0005);
 }
@@ -143,8 +143,8 @@ TEST_F(VolumeScene, GeneratorsTakeTheirOwnKeys) {
   const Experiment e = good(R"({"surfaces":[{"volume":{"generator":"sphere","size":[24,24,24],"radius":"30mm",
                                 "extent":["10cm","10cm","10cm"]},"iso":{"threshold":0}}]})");
   EXPECT_NEAR(iso(e).field().bounds().upper.x(), 0.05, 1e-12);
-  Hint hint;
-  const Foot foot = iso(e).closest(Vec3(0.04, 0.0, 0.0), 1.0, hint);
+  SurfaceCache cache;
+  const Foot foot = iso(e).view(cache).nearest(Vec3(0.04, 0.0, 0.0), 1.0);
   ASSERT_TRUE(foot.found());
   EXPECT_NEAR(foot.point.norm(), 0.03, 0.0003);
   const Experiment cavity = good(R"({"surfaces":[{"volume":{"generator":"cavity","size":[24,16,16],
@@ -304,6 +304,7 @@ TEST_F(VolumeScene, AnIsosurfaceIsTouched) {
                                 "iso":{"threshold":0},"law":")") +
                               law + R"("}],"stroke":{"depth":"1mm"}})");
     ProxyState state;
+    ProxyCache cache;
     double strongest = 0.0;
     for (int i = 0; i < 400; ++i) {
       // Straight down into the ball.
@@ -311,7 +312,7 @@ TEST_F(VolumeScene, AnIsosurfaceIsTouched) {
       ProbeSample probe;
       probe.pose.position = Vec3(0.0, y, 0.0);
       probe.twist.linear = Vec3(0.0, -0.01, 0.0);
-      strongest = std::max(strongest, step(e.scene, state, probe, Seconds(1e-3)).wrench.force.norm());
+      strongest = std::max(strongest, step(e.scene, state, cache, probe, Seconds(1e-3)).wrench.force.norm());
     }
     EXPECT_GT(strongest, 0.5) << law;
   }

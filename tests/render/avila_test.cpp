@@ -5,7 +5,8 @@
 #include <numbers>
 
 #include "asperity/core/rng.h"
-#include "asperity/render/law_forces.h"
+#include "asperity/render/law_registry.h"
+#include "asperity/render/laws/forces.h"
 #include "tests/render/volumes.h"
 
 namespace asperity::avila_test {
@@ -22,10 +23,11 @@ struct Touch {
   std::shared_ptr<const IsoSurface> surface;
   AvilaLaw law;
   Material material;
-  ContactState state;
+  Contact state;
+  SurfaceCache cache;
 
   LawForce at(const Vec3& p, const Vec3& v = Vec3::Zero()) {
-    return avila_force(law, *surface, surface->view(), material, p, v, state);
+    return avila_force(law, *surface, surface->view(cache), material, p, v, state);
   }
 };
 
@@ -112,7 +114,7 @@ double detected(double thickness, double speed, double rate, int passages) {
   Rng rng(7);
   int found = 0;
   for (int i = 0; i < passages; ++i) {
-    touch.state.iso = {};
+    touch.state = {};
     touch.state.seen_outside = false;
     bool felt = false;
     for (double x = advance * (1.0 + rng.uniform()); x > -thickness - advance; x -= advance)

@@ -1,5 +1,5 @@
 // Surfaces that move, deform, change their coat, their level of detail or their size while they are touched.
-#include "asperity/render/detail/change.h"
+#include "asperity/render/stages/limits.h"
 
 #include <gtest/gtest.h>
 

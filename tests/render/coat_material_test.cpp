@@ -1,5 +1,5 @@
 // Maps of the material on a coat, and what a view makes of touch.
-#include "asperity/render/detail/coat_material.h"
+#include "asperity/render/local_material.h"
 
 #include <gtest/gtest.h>
 
@@ -298,7 +298,7 @@ TEST(View, T10_level_changes_pay_from_the_tank) {
     most = std::max(most, work);
     hand = next;
     force = touch(scene, state, hand).wrench.force;
-    if (!state.contacts.empty()) level_sum += state.contacts[0].hint.moment.level;
+    if (!state.contacts.empty()) level_sum += state.contacts[0].detail_level.value_or(0.0);
   }
   EXPECT_GT(level_sum, 100.0);  // levels did change
   // What holding a force for a tick gives: 1/2 k (v T)^2 each.

@@ -1,4 +1,5 @@
-#include "asperity/render/detail/constraint_solve.h"
+#include "asperity/render/contact/planes.h"
+#include "asperity/render/step.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -160,47 +161,43 @@ TEST(ProjectOntoPlanes, the_skin_is_added_when_asked_for) {
   EXPECT_EQ(onto_plane(Vec3(0.0, 0.0, 2.0), planes[0]), Vec3(0.0, 0.0, 2.0));
 }
 
-/// A point among half-spaces: what the solve asks of a scene, without one.
-struct HalfSpaces {
-  PlaneSet planes;
-  double skin = 1e-7;
+/// A large square of two triangles with this normal, `offset` along it from the origin.
+std::shared_ptr<const MeshSurface> square(const Vec3& normal, double offset, double half) {
+  const Vec3 u = half * normal.unitOrthogonal();
+  const Vec3 v = normal.cross(u);
+  const Vec3 centre = offset * normal;
+  MeshSource source;
+  source.positions = {centre - u - v, centre + u - v, centre + u + v, centre - u + v};
+  source.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return must(make_mesh_surface(std::move(source)));
+}
 
-  void contacts(const Vec3& position, PlaneSet& out) const {
-    for (const ConstraintPlane& one : planes) {
-      if (one.normal.dot(position) - one.offset <= 2.0 * skin) out.push_back(one);
-    }
-  }
-  [[nodiscard]] double sweep(const Segment& motion) const {
-    double first = 1.0;
-    for (const ConstraintPlane& one : planes) {
-      const double from = one.normal.dot(motion.from) - one.offset - skin;
-      const double to = one.normal.dot(motion.to) - one.offset - skin;
-      // A motion along the plane ends on it up to rounding: that is no touch.
-      if (to < -1e-3 * skin && to < from) first = std::min(first, std::max(0.0, from / (from - to)));
-    }
-    return first;
-  }
-  [[nodiscard]] double tolerance() const { return 0.5 * skin; }
-  [[nodiscard]] bool rolls(const ConstraintPlane&) const { return false; }
-  [[nodiscard]] Vec3 foot(const ConstraintPlane& one) const { return one.contact.point; }
-};
-
-RC_GTEST_PROP(SolveConstraints, reaches_the_nearest_point_of_a_convex_cell_within_one_tick, (std::uint64_t seed)) {
+RC_GTEST_PROP(JointSolve, reaches_the_nearest_point_of_a_convex_cell_within_one_tick, (std::uint64_t seed)) {
   Rng rng(seed);
-  HalfSpaces cell;
+  std::vector<Instance> walls;
+  PlaneSet planes;
   for (int i = 0; i < 5; ++i) {
     const Vec3 normal = random_direction(rng);
-    ConstraintPlane one = plane(normal, -rng.uniform(0.1, 1.0), cell.skin);
-    one.contact.element = static_cast<std::uint32_t>(i);
-    cell.planes.push_back(one);
+    const double offset = -rng.uniform(0.1, 1.0);
+    Instance wall;
+    wall.name = "wall";
+    wall.surface = square(normal, offset, 100.0);
+    wall.law = GodObjectLaw{};
+    planes.push_back(plane(normal, offset, base_of(wall.surface)->skin()));
+    walls.push_back(std::move(wall));
   }
+  const Scene scene = must(Scene::build(std::move(walls), 0.0));
   const Vec3 goal = random_vector(rng, 3.0);
-  const ConstraintSolution solution = solve_constraints(cell, Vec3::Zero(), goal);
-  RC_ASSERT(solution.converged);
-  for (const ConstraintPlane& one : cell.planes) RC_ASSERT(one.normal.dot(solution.proxy) >= one.offset);
-  const PlaneProjection best = project_onto_planes(goal, cell.planes, true);
-  RC_ASSERT((solution.proxy - best.point).norm() <= 1e-4);
-  RC_ASSERT(std::abs((solution.proxy - goal).norm() - (best.point - goal).norm()) <= 1e-6);
+  ProxyState state;
+  step(scene, state, {}, Seconds(1e-3));
+  ProbeSample probe;
+  probe.pose.position = goal;
+  const ForceSample felt = step(scene, state, probe, Seconds(1e-3));
+  RC_ASSERT(!felt.flags.has(TickFlag::not_converged));
+  for (const ConstraintPlane& one : planes) RC_ASSERT(one.normal.dot(state.proxy) >= one.offset);
+  const PlaneProjection best = project_onto_planes(goal, planes, true);
+  RC_ASSERT((state.proxy - best.point).norm() <= 1e-3);
+  RC_ASSERT(std::abs((state.proxy - goal).norm() - (best.point - goal).norm()) <= 1e-6);
 }
 
 }  // namespace

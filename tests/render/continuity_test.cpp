@@ -51,9 +51,10 @@ const std::vector<Ground>& grounds() {
 
 /// A ground's own height over (x, y): where its middle is touched from outside.
 Vec3 over(const Ground& ground, double above) {
-  Hint hint;
+  SurfaceCache hint;
   const Vec3 high = ground.centre + 0.03 * ground.outward;
-  const SweptHit hit = ground.surface->segment({high, ground.centre - 0.2 * ground.outward}, 0.0, Sides::both, hint);
+  const SweptHit hit =
+      ground.surface->view(hint).first_touch({high, ground.centre - 0.2 * ground.outward}, Sides::both);
   EXPECT_TRUE(hit.hit) << ground.name;
   return hit.contact.point + above * ground.outward;
 }

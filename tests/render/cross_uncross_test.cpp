@@ -5,7 +5,8 @@
 #include <limits>
 
 #include "asperity/core/rng.h"
-#include "asperity/render/law_forces.h"
+#include "asperity/render/law_registry.h"
+#include "asperity/render/laws/forces.h"
 #include "tests/render/volumes.h"
 
 namespace asperity::cross_uncross_test {
@@ -21,13 +22,17 @@ constexpr double stiffness = 1000.0;
 struct Touch {
   std::shared_ptr<const IsoSurface> surface;
   CrossUncrossLaw law;
-  ContactState state;
+  Contact state;
+  SurfaceCache cache;
 
-  LawForce at(const Vec3& p, const Vec3& v = Vec3::Zero()) { return through(surface->view(), p, v); }
+  /// What it remembers of its field.
+  [[nodiscard]] CrossingMemory& memory() { return state.memory<CrossingMemory>(); }
+
+  LawForce at(const Vec3& p, const Vec3& v = Vec3::Zero()) { return through(surface->view(cache), p, v); }
   LawForce through(const IsoView& view, const Vec3& p, const Vec3& v = Vec3::Zero()) {
     Material material;
     material.stiffness = stiffness;
-    return cross_uncross_force(law, *surface, view, material, p, v, state);
+    return cross_uncross_force(law, view, material, p, v, state);
   }
 };
 
@@ -62,7 +67,7 @@ TEST(CrossUncross, IsASpringToTheSurfaceFromTheCrossingOn) {
       EXPECT_LT((force.normal - Vec3::UnitX()).norm(), 1e-5);
     }
     EXPECT_FALSE(touch.at(Vec3(1e-6, 0.001, 0.002)).contact);
-    EXPECT_FALSE(touch.state.iso.crossed);
+    EXPECT_FALSE(touch.memory().crossed);
   }
 }
 
@@ -157,7 +162,7 @@ TEST(CrossUncross, SheetCrossedAndUncrossedWithinATickLeavesNothing) {
   Touch touch = touching(sheet);
   touch.at(Vec3(0.005, 0.0, 0.0));
   EXPECT_FALSE(touch.at(Vec3(-0.005, 0.0, 0.0)).contact);
-  EXPECT_FALSE(touch.state.iso.crossed);
+  EXPECT_FALSE(touch.memory().crossed);
   // Back over both faces and into the sheet, then on: the contact is the one with the face crossed last.
   const LawForce force = touch.at(Vec3(-0.1e-3, 0.0, 0.0));
   ASSERT_TRUE(force.contact);
@@ -168,17 +173,17 @@ TEST(CrossUncross, SheetCrossedAndUncrossedWithinATickLeavesNothing) {
 TEST(CrossUncross, ThresholdThatPassesOverTheProbePicksItUpAndLetsItGo) {
   Touch touch = touching(wall(50.0));
   const Vec3 p(0.001, 0.0, 0.0);  // where the field is 0.05
-  EXPECT_FALSE(touch.through(touch.surface->view_at(0, 0.0), p).contact);
-  EXPECT_FALSE(touch.through(touch.surface->view_at(0, 0.04), p).contact);
+  EXPECT_FALSE(touch.through(touch.surface->view(touch.cache.cells, 0, 0.0), p).contact);
+  EXPECT_FALSE(touch.through(touch.surface->view(touch.cache.cells, 0, 0.04), p).contact);
   double last = 0.0;
   for (const double threshold : {0.051, 0.06, 0.07, 0.08}) {
-    const LawForce force = touch.through(touch.surface->view_at(0, threshold), p);
+    const LawForce force = touch.through(touch.surface->view(touch.cache.cells, 0, threshold), p);
     ASSERT_TRUE(force.contact) << threshold;
     EXPECT_NEAR(force.force.x(), stiffness * (threshold / 50.0 - 0.001), 1e-4);
     EXPECT_GT(force.force.x(), last);
     last = force.force.x();
   }
-  EXPECT_FALSE(touch.through(touch.surface->view_at(0, 0.045), p).contact);
+  EXPECT_FALSE(touch.through(touch.surface->view(touch.cache.cells, 0, 0.045), p).contact);
   EXPECT_TRUE(touch.state.seen_outside);
 }
 
@@ -198,14 +203,14 @@ RC_GTEST_PROP(CrossUncross, ContactIsTheSideOfTheProbeOnceSeenOutside, ()) {
     const Vec3 p(number(), number(), number());
     const LawForce force = touch.at(p);
     FieldJet jet;
-    IsoHint hint;
-    RC_ASSERT(gyroid->view().sample(p, hint, jet));
+    CellCache hint;
+    RC_ASSERT(gyroid->view(hint).sample(p, jet));
     const bool inside = jet.value < 0.2;
     outside_before = outside_before || !inside || touch.state.seen_outside;
     if (std::abs(jet.value - 0.2) < 1e-6) continue;
     RC_ASSERT(force.contact == (inside && touch.state.seen_outside));
     if (!force.contact) continue;
-    RC_ASSERT(gyroid->view().sample(force.point, hint, jet));
+    RC_ASSERT(gyroid->view(hint).sample(force.point, jet));
     RC_ASSERT(std::abs(jet.value - 0.2) < 1e-4);
     RC_ASSERT(force.force.isApprox(stiffness * (force.point - p), 1e-9));
   }
@@ -286,9 +291,9 @@ TEST(CrossUncrossLiteral, CrossingIsNoticedATickLateAndFeltTwoTicksLate) {
   const Vec3 inside(-0.008, 0.0, 0.0);
   touch.at(Vec3(0.003, 0.0, 0.0));
   EXPECT_FALSE(touch.at(inside).contact);  // left the loop at the first point of the path
-  EXPECT_FALSE(touch.state.iso.crossed);
+  EXPECT_FALSE(touch.memory().crossed);
   EXPECT_FALSE(touch.at(inside).contact);  // the path begins inside: Cross = 1, and Exit
-  EXPECT_TRUE(touch.state.iso.crossed);
+  EXPECT_TRUE(touch.memory().crossed);
   const LawForce force = touch.at(inside);
   ASSERT_TRUE(force.contact);
   EXPECT_GT(force.force.x(), 0.0);
@@ -343,7 +348,7 @@ TEST(CrossUncrossLiteral, ErratumShortReachMissesTheSurface) {
   for (int i = 0; i < 2; ++i) touch.at(Vec3(-0.003, 0.0, 0.0));
   EXPECT_TRUE(touch.at(Vec3(-0.003, 0.0, 0.0)).contact);
   EXPECT_FALSE(touch.at(Vec3(-0.015, 0.0, 0.0)).contact);
-  EXPECT_TRUE(touch.state.iso.crossed);  // still held, and nothing felt
+  EXPECT_TRUE(touch.memory().crossed);  // still held, and nothing felt
 }
 
 TEST(CrossUncrossLiteral, ErratumLineOfGridPointsSkipsWhatTheMotionPasses) {
@@ -351,10 +356,10 @@ TEST(CrossUncrossLiteral, ErratumLineOfGridPointsSkipsWhatTheMotionPasses) {
   // whoever sees it uncrosses on the way.
   const auto surface =
       surface_of(sampled(cube(0.02, 41), [](const Vec3& p) { return p.norm() < 1e-9 ? 1.0 : -1.0; }), 0.0);
-  IsoHint hint;
+  CellCache hint;
   const auto outside = [&](const Vec3& p) {
     FieldJet jet;
-    return surface->view().sample(p, hint, jet) && jet.value > 0.0;
+    return surface->view(hint).sample(p, jet) && jet.value > 0.0;
   };
   Rng rng(3);
   const auto within = [&rng](double half) {
@@ -370,13 +375,13 @@ TEST(CrossUncrossLiteral, ErratumLineOfGridPointsSkipsWhatTheMotionPasses) {
     for (int i = 0; i <= 2000 && !passes; ++i) passes = outside(from + i / 2000.0 * (to - from));
     if (!passes || outside(from) || outside(to)) continue;
     ++passed;
-    seen_by_roots += surface->view().first_crossing({from, to}, hint).found ? 1 : 0;
+    seen_by_roots += surface->view(hint).first_crossing({from, to}).found ? 1 : 0;
     Touch touch = touching(surface, Formulation::literal);
     touch.at(from);
-    touch.state.iso.crossed = true;
-    touch.state.iso.normal = Vec3::UnitX();
+    touch.memory().crossed = true;
+    touch.state.surface.normal = Vec3::UnitX();
     touch.at(to);
-    seen_by_grid_points += touch.state.iso.crossed ? 0 : 1;
+    seen_by_grid_points += touch.memory().crossed ? 0 : 1;
   }
   EXPECT_EQ(seen_by_roots, passed);
   EXPECT_LT(seen_by_grid_points, 0.75 * passed);

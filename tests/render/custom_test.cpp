@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "asperity/geometry/generators.h"
-#include "asperity/render/custom_law.h"
+#include "asperity/render/law_registry.h"
 #include "tests/render/fixtures.h"
 #include "tests/surface/custom_fields.h"
 

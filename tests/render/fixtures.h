@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"
 #include "tests/surface/coats.h"
 

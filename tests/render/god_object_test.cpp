@@ -77,7 +77,7 @@ void poke_and_slide(const Scene& scene, const MeshSurface& surface, double radiu
   const TriangleMesh& mesh = surface.mesh();
   const double edge = mesh.mean_edge();
   ProxyState state;
-  Hint oracle;
+  SurfaceCache oracle;
   Vec3 place = mesh.corners(rng.below(static_cast<std::uint32_t>(mesh.triangles().size())))[0];
   Vec3 heading = random_direction(rng);
   double depth = -2.0 * edge;  // begin outside
@@ -86,9 +86,9 @@ void poke_and_slide(const Scene& scene, const MeshSurface& surface, double radiu
     if (rng.below(40) == 0) heading = random_direction(rng);
     if (rng.below(25) == 0) goal_depth = rng.uniform(-0.3, 1.0) * deepest;
     depth += std::clamp(goal_depth - depth, -0.1 * edge, 0.1 * edge);
-    const Foot foot = surface.closest(place + 0.05 * edge * rng.uniform() * heading, infinity, oracle);
+    const Foot foot = surface.view(oracle).nearest(place + 0.05 * edge * rng.uniform() * heading, infinity);
     place = foot.point;
-    const Vec3 outward = interpolated_normal(mesh, foot.element, foot.barycentric);
+    const Vec3 outward = interpolated_normal(mesh, foot.element, foot.at);
     const Vec3 probe = place + (radius - depth) * outward;
     const ForceSample force = step(scene, state, at(probe), tick);
     // Depth of the ball: how far its centre lies inside the surface's offset by the radius.
@@ -153,7 +153,7 @@ TEST(GodObject, WildJumpsNeverCarryTheProxyInside) {
     const double radius = m % 2 == 0 ? 0.0 : surface->mesh().mean_edge() * rng.uniform(0.1, 2.0);
     const Scene scene = scene_of(surface, radius);
     ProxyState state;
-    Hint oracle;
+    SurfaceCache oracle;
     step(scene, state, at(0.2 * random_direction(rng)), tick);
     for (int i = 0; i < 2000; ++i) {
       const double reach = rng.below(4) == 0 ? 0.2 : 0.06;
@@ -236,8 +236,8 @@ TEST(GodObject, ProxyIsALocalMinimumOfItsDistanceToTheProbe) {
       for (int j = 0; j < 8; ++j) {
         const Vec3 neighbour = state.proxy + 0.02 * edge * random_direction(rng);
         if ((neighbour - probe).norm() > distance - 2e-4 * edge) continue;
-        Hint hint;
-        const SweptHit hit = surface->segment({state.proxy, neighbour}, radius, Sides::front, hint);
+        SurfaceCache hint;
+        const SweptHit hit = surface->view(hint).sweep({state.proxy, neighbour}, radius, Sides::front);
         EXPECT_TRUE(hit.hit) << "mesh " << m << " tick " << i << ": a nearer place is free";
       }
     }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "asperity/geometry/generators.h"
+#include "asperity/render/law_registry.h"
 #include "tests/field/volumes.h"
 #include "tests/render/implicits.h"
 

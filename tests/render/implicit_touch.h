@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "asperity/render/law_forces.h"
+#include "asperity/render/laws/forces.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/render/fixtures.h"
 
@@ -26,11 +26,9 @@ inline std::shared_ptr<const ImplicitSurface> surface_of(std::shared_ptr<const S
   return std::make_shared<const ImplicitSurface>(test::must(ImplicitSurface::build(std::move(parts))));
 }
 
-/// As if nothing had been felt yet. What is left are caches.
-inline void forget(ContactState& state) {
-  state.iso = {};
-  state.seen_outside = false;
-  state.turn_budget = 0.0;
+/// As if nothing had been felt yet.
+inline void forget(Contact& state) {
+  state = {};
 }
 
 /// A probe and the law that it feels a surface by.
@@ -40,13 +38,14 @@ struct Touch {
   L law;
   Material material{};
   Seconds dt{1e-3};
-  ContactState state{};
+  Contact state{};
+  SurfaceCache cache{};
 
   LawForce at(const Vec3& p, const Vec3& velocity = Vec3::Zero()) {
     if constexpr (std::is_same_v<L, MagneticLaw>) {
-      return magnetic_force(law, *surface, material, p, velocity, dt, state);
+      return magnetic_force(law, *surface, material, p, velocity, dt, state, cache);
     } else {
-      return virtual_contact_force(law, *surface, material, p, velocity, dt, state);
+      return virtual_contact_force(law, *surface, material, p, velocity, dt, state, cache);
     }
   }
 };

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/render/custom_law.h"
+#include "asperity/render/law_registry.h"
 #include "tests/render/fixtures.h"
 
 namespace asperity::law_test {
@@ -187,7 +187,7 @@ RC_GTEST_PROP(NoForceInTheAir, around_a_closed_coated_mesh, (std::uint64_t seed)
   static const auto surface = coated(random_closed_mesh(5, 2, 0.02, 0.3), wavy_map(5e-4), Mapping::triplanar);
   static const auto scenes = scenes_of_every_law(surface);
   Rng rng(seed);
-  Hint hint;
+  SurfaceCache hint;
   for (const auto& [name, scene] : scenes) {
     for (int i = 0; i < 20; ++i) {
       const Vec3 p = random_vector(rng, 0.03);

@@ -47,8 +47,9 @@ const std::shared_ptr<const ImplicitSurface>& shared_box() {
 struct Rival {
   std::shared_ptr<const ImplicitSurface> surface = shared_box();
   Material material{};
-  ContactState state{};
-  LawForce at(const Vec3& p) { return normal_perturbation_force(*surface, material, p, state); }
+  Contact state{};
+  SurfaceCache cache{};
+  LawForce at(const Vec3& p) { return normal_perturbation_force(*surface, material, p, state, cache); }
 };
 
 TEST(NormalPerturbation, ForceIsStiffnessTimesDepthAndHeightAlongTheTurnedNormal) {

@@ -87,7 +87,7 @@ class DenseOracle {
     constexpr double share[10][2] = {{0.5, 0.0},  {0.0, 0.5},  {0.5, 0.5},  {1.0 / 3, 1.0 / 3}, {0.25, 0.25},
                                      {0.5, 0.25}, {0.25, 0.5}, {0.25, 0.0}, {0.0, 0.25},        {0.25, 0.75}};
     const auto place = [&](const ReliefFrame& frame, const Vec2& uv) {
-      return relief.point(frame, uv.x(), uv.y()).position;
+      return relief.point(frame, uv.x(), uv.y()).point;
     };
     double worst = 0.0;
     for (std::uint32_t face = 0; face < relief.base().mesh().triangles().size(); ++face) {

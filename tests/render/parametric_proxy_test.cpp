@@ -195,8 +195,7 @@ TEST(ParametricProxy, SpringNeverGainsAtAHeldProbe) {
 
 /// Whether a point is inside of a torus with features.
 bool inside(const ParametricSurface& surface, const Vec3& p) {
-  Hint hint;
-  return surface.eval(p, hint).value < 0.0;
+  return surface.view().eval(p).value < 0.0;
 }
 
 TEST(ParametricProxy, T5_no_speed_passes_a_closed_surface) {
@@ -217,7 +216,7 @@ TEST(ParametricProxy, T5_no_speed_passes_a_closed_surface) {
       const ForceSample out = touch(scene, state, p);
       if (out.flags.has(TickFlag::contact)) {
         ++pressed;
-        ASSERT_EQ(state.contacts[0].side < 0.0, start) << run << " " << i;
+        ASSERT_EQ(state.contacts[0].first().back, start) << run << " " << i;
       } else if (i % 5 == 0) {
         ASSERT_EQ(inside(surface, state.proxy), start) << run << " " << i << " speed " << speed;
       }
@@ -303,8 +302,8 @@ TEST(ParametricProxy, FrictionHoldsWithinTheConeAndSlidesOnIt) {
     ASSERT_TRUE(out.flags.has(TickFlag::contact));
     const double push = out.wrench.force.dot(out.contact.normal);
     const double along = (out.wrench.force - push * out.contact.normal).norm();
-    ASSERT_LE(along, (other.contacts[0].sliding ? 0.3 : 0.5) * push * (1.0 + 1e-9) + 1e-12) << i;
-    sliding += other.contacts[0].sliding ? 1 : 0;
+    ASSERT_LE(along, (other.contacts[0].surface.sliding ? 0.3 : 0.5) * push * (1.0 + 1e-9) + 1e-12) << i;
+    sliding += other.contacts[0].surface.sliding ? 1 : 0;
   }
   EXPECT_GT(sliding, 1000);
 }
@@ -381,13 +380,12 @@ TEST(ParametricProxy, ABallRestsAtItsRadiusAndIsNotPassed) {
   const ParametricSurface& surface = *parametric_of(scene.instances()[0].surface);
   ProxyState state;
   for (double x = 0.04; x > 0.026; x -= 0.001) touch(scene, state, Vec3(x, 0.0, 0.05));
-  Hint hint;
   for (int i = 0; i < 300; ++i) {
     const double u = 0.004 * i;
     const double rho = surface.jet(Vec2(0.0, 0.05)).point.x() + radius - 0.001;
     const ForceSample out = touch(scene, state, Vec3(rho * std::cos(u), rho * std::sin(u), 0.05));
     ASSERT_TRUE(out.flags.has(TickFlag::contact)) << i;
-    ASSERT_NEAR(surface.closest(state.proxy, infinity, hint).distance, radius, 5e-6) << i;
+    ASSERT_NEAR(surface.view().nearest(state.proxy, infinity).distance, radius, 5e-6) << i;
     ASSERT_GT(out.wrench.force.dot(Vec3(std::cos(u), std::sin(u), 0.0)), 0.5) << i;
   }
 }

@@ -84,7 +84,7 @@ TEST(T5_pop_through, a_hundred_thousand_segments_meet_whatever_a_dense_mesh_show
   for (std::size_t which = 0; which < closed_reliefs().size(); ++which) {
     const auto& [name, surface, cells] = closed_reliefs()[which];
     const Tessellation& mesh = dense(which);
-    Hint hint;
+    SurfaceCache hint;
     int crossing = 0;
     for (int i = 0; i < 20000; ++i) {
       const double stride = random_stride(rng);
@@ -92,7 +92,7 @@ TEST(T5_pop_through, a_hundred_thousand_segments_meet_whatever_a_dense_mesh_show
       if (depth_inside(mesh.index, from) > -2.0 * mesh.error) continue;
       const Vec3 to = from + stride * random_direction(rng);
       const FirstHit entry = mesh.index.first_hit({from, to});
-      const SweptHit hit = surface->segment({from, to}, 0.0, i % 2 == 0 ? Sides::both : Sides::front, hint);
+      const SweptHit hit = surface->view(hint).first_touch({from, to}, i % 2 == 0 ? Sides::both : Sides::front);
       if (entry.face != no_index) {
         // Where it is deepest: between where it comes in and where it next goes out, or its end.
         const Vec3 entered = from + (entry.t + 1e-9) * (to - from);
@@ -220,7 +220,7 @@ TEST(T5_pop_through, a_proxy_on_an_open_sheet_passes_only_around_its_rim) {
     const auto next = [&] {
       return Vec3(rng.uniform(-6e-3, 6e-3), rng.uniform(-6e-3, 6e-3), rng.uniform(-4e-3, 4e-3));
     };
-    Hint hint;
+    SurfaceCache hint;
     const auto check = [&](int i, const Vec3& probe, const ForceSample& felt) {
       const FieldSample at = surface->eval(felt.proxy, hint);
       ASSERT_GT(side * at.value, -surface->skin()) << "tick " << i << ", probe " << probe.transpose();

@@ -137,9 +137,9 @@ RC_GTEST_PROP(ProxyInvariants, with_friction_the_force_lies_within_coulombs_cone
     probe += heading;
     if (probe.head<2>().cwiseAbs().maxCoeff() > 0.015) heading = -heading;
     const Vec3 before = state.proxy;
-    const bool held = state.contacts.size() > 0 && state.contacts[0].touching;
-    const Vec3 normal_before = held ? Vec3(state.contacts[0].side * state.contacts[0].point.normal()) : Vec3::Zero();
-    const bool slid = held && state.contacts[0].sliding;
+    const bool held = state.contacts.size() > 0 && state.contacts[0].surface.rests;
+    const Vec3 normal_before = held ? state.contacts[0].surface.normal : Vec3::Zero();
+    const bool slid = held && state.contacts[0].surface.sliding;
     const ForceSample felt = touch(scene, state, probe);
     if (!felt.flags.has(TickFlag::contact)) continue;
     const Vec3& force = felt.wrench.force;
@@ -188,23 +188,23 @@ RC_GTEST_PROP(ProxyInvariants, a_probe_that_has_left_feels_exactly_nothing, (std
   const double still = rng.below(2) == 0 ? 0.0 : rng.uniform(0.0, 1.0);
   const Scene scene = must(Scene::build({instance_of(surface, still, still)}, 0.0));
   const TriangleMesh& mesh = surface->base().mesh();
-  Hint hint;
+  SurfaceCache hint;
   for (int i = 0; i < 20; ++i) {
     const ReliefFrame frame = surface->frame(random_face(rng, mesh));
     const Vec3 at = random_barycentric(rng, 0.2);
     const ReliefPoint point = surface->point(frame, at[1], at[2]);
-    const Vec3 normal = point.normal();
-    const Vec3 out = point.position + 2e-5 * normal;
+    const Vec3 normal = point.front;
+    const Vec3 out = point.point + 2e-5 * normal;
     // Only where the way in and out is free.
-    if (surface->segment({point.position + 1e-3 * normal, out}, 0.0, Sides::both, hint).hit) continue;
+    if (surface->view(hint).first_touch({point.point + 1e-3 * normal, out}, Sides::both).hit) continue;
     ProxyState state;
-    touch(scene, state, point.position + 1e-3 * normal);
-    const ForceSample pressed = touch(scene, state, point.position - 1e-4 * normal);
+    touch(scene, state, point.point + 1e-3 * normal);
+    const ForceSample pressed = touch(scene, state, point.point - 1e-4 * normal);
     RC_ASSERT(pressed.flags.has(TickFlag::contact));
     RC_ASSERT(pressed.wrench.force.dot(normal) > 0.0);
     touch(scene, state, out);
     const ForceSample left = touch(scene, state, out + 1e-4 * normal);
-    if (surface->segment({out, out + 1e-4 * normal}, 0.0, Sides::both, hint).hit) continue;
+    if (surface->view(hint).first_touch({out, out + 1e-4 * normal}, Sides::both).hit) continue;
     RC_ASSERT(left.wrench.force == Vec3::Zero());
     RC_ASSERT(!left.flags.has(TickFlag::contact));
     RC_ASSERT(left.proxy == out + 1e-4 * normal);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/render/detail/generated_geometry.h"
+#include "asperity/render/contact/generated_geometry.h"
 #include "tests/render/fixtures.h"
 #include "tests/render/oracle.h"
 
@@ -127,16 +127,16 @@ TEST(GeneratedGeometry, stops_every_motion_where_the_dense_mesh_does) {
     int hits = 0;
     int unknown = 0;
     for (int i = 0; i < 4000; ++i) {
-      Hint hint;
+      SurfaceCache hint;
       const double radius = i % 2 == 0 ? 0.0 : rng.uniform(1e-4, 2e-3);
       const Vec3 middle = dense.mesh().corners(random_face(rng, dense.mesh()))[0];
       const Vec3 way = rng.uniform(1e-4, 3e-3) * random_direction(rng);
       const Segment motion{middle - way, middle + way};
       // A motion that begins within the surface's touch may be taken for either.
-      if (dense.closest(motion.from, infinity, hint).distance < radius + 3.0 * dense.skin()) continue;
+      if (dense.view(hint).nearest(motion.from, infinity).distance < radius + 3.0 * dense.skin()) continue;
       GeneratedPatch patch;
       patch.start(*relief, GeneratedGeometryLaw{n, i % 3 == 0 ? 0.0 : rng.uniform(3e-4, 2e-3)});
-      const SweptHit expected = dense.segment(motion, radius, Sides::both, hint);
+      const SweptHit expected = dense.view(hint).sweep(motion, radius, Sides::both);
       const SweptHit hit = patch.segment(motion, radius, Sides::both);
       if (!patch.complete()) {
         ++unknown;
@@ -165,9 +165,9 @@ TEST(GeneratedGeometry, touches_the_planes_that_the_dense_mesh_touches) {
     const std::array<Vec3, 3> corners = dense.mesh().corners(random_face(rng, dense.mesh()));
     const Vec3 p = corners[0] + rng.uniform(0.1, 0.9) * (corners[1] - corners[0]) +
                    rng.uniform(0.6, 1.8) * dense.skin() * random_direction(rng);
-    Hint hint;
+    SurfaceCache hint;
     ContactSet expected;
-    dense.contacts(p, 0.0, Sides::both, hint, expected);
+    dense.view(hint).contacts(p, 0.0, Sides::both, expected);
     GeneratedPatch patch;
     patch.start(*relief, GeneratedGeometryLaw{n, 0.0});
     // The same thickness, so that both are asked the same.
@@ -260,7 +260,7 @@ TEST(Rivals, nothing_is_passed_at_any_speed) {
       instance.sides = Sides::front;
       const Scene scene = must(Scene::build({instance}, 0.0));
       Rng rng(17);
-      Hint hint;
+      SurfaceCache hint;
       for (int i = 0; i < 200; ++i) {
         ProxyState state;
         const Vec3 direction = random_direction(rng);
@@ -289,10 +289,9 @@ TEST(Rivals, the_smooth_proxy_agrees_within_the_facets_error) {
       for (std::size_t i = 0; i < path.size(); i += 7) {
         // Shallow enough that there is one nearest place.
         const Vec3 outward = slide.round ? Vec3(path[i].normalized()) : Vec3(Vec3::UnitZ());
-        Hint hint;
-        const Foot foot = slide.relief->closest(path[i], infinity, hint);
-        const Vec3 probe =
-            foot.point - 4e-5 * slide.relief->point(hint.relief.frame, hint.relief.u, hint.relief.v).normal();
+        SurfaceCache hint;
+        const Foot foot = slide.relief->view(hint).nearest(path[i], infinity);
+        const Vec3 probe = foot.point - 4e-5 * slide.relief->view(hint).front(foot);
         const Vec3 outside = foot.point + 2e-3 * outward;
         const ForceSample expected = poke(smooth, outside, probe);
         const ForceSample sample = poke(faceted, outside, probe);
@@ -315,8 +314,8 @@ RC_GTEST_PROP(Rivals, render_no_force_over_the_relief_and_its_facets, (std::uint
     ProxyState state;
     for (int i = 0; i < 20; ++i) {
       const Vec3 above(rng.uniform(-0.018, 0.018), rng.uniform(-0.018, 0.018), 2e-3);
-      Hint hint;
-      const SweptHit hit = relief->segment({above, above - 4e-3 * Vec3::UnitZ()}, 0.0, Sides::both, hint);
+      SurfaceCache hint;
+      const SweptHit hit = relief->view(hint).first_touch({above, above - 4e-3 * Vec3::UnitZ()}, Sides::both);
       // Slopes of up to one in three make of a distance at most half as much again along z.
       const Vec3 p = hit.contact.point + (1.5 * error + 1e-8 + rng.uniform(0.0, 1e-3)) * Vec3::UnitZ();
       // Straight down, so that no other wave is in the way.
@@ -350,10 +349,10 @@ TEST(Rivals, feel_facets_where_the_proxy_feels_none) {
   const auto relief = reference_surface(0.0);
   std::vector<Vec3> path;
   for (const Vec3& p : line(Vec3(-4e-3, 1e-3, 0.0), Vec3(4e-3, 1e-3, 0.0), 4000)) {
-    Hint hint;
-    const Foot foot =
-        relief->closest(Vec3(p.x(), p.y(), 5.5e-4 * std::cos(2.0 * std::numbers::pi * p.x() / 5e-3)), infinity, hint);
-    path.emplace_back(foot.point - 2e-4 * relief->point(hint.relief.frame, hint.relief.u, hint.relief.v).normal());
+    SurfaceCache hint;
+    const Foot foot = relief->view(hint).nearest(
+        Vec3(p.x(), p.y(), 5.5e-4 * std::cos(2.0 * std::numbers::pi * p.x() / 5e-3)), infinity);
+    path.emplace_back(foot.point - 2e-4 * relief->view(hint).front(foot));
   }
   const Vec3 outside = path.front() + 2e-3 * Vec3::UnitZ();
   const double smooth = largest_jump(slide(scene_of(relief, ProxyLaw{}), path, outside));
@@ -501,7 +500,7 @@ TEST(DenseOracleTest, the_relief_is_first_crossed_where_the_facets_say) {
   for (const Slide& slide : slides()) {
     const DenseOracle oracle(*slide.relief, 32);
     Rng rng(23);
-    Hint hint;
+    SurfaceCache hint;
     int certain = 0;
     for (int i = 0; i < 1500; ++i) {
       Vec3 middle = slide.round ? Vec3(0.02 * random_direction(rng)) : random_vector(rng, 0.012);
@@ -509,7 +508,7 @@ TEST(DenseOracleTest, the_relief_is_first_crossed_where_the_facets_say) {
       const Vec3 way = rng.uniform(0.5e-3, 8e-3) * random_direction(rng);
       const Segment motion{middle - way, middle + way};
       const DenseOracle::Crossing crossing = oracle.first_crossing(motion);
-      const SweptHit hit = slide.relief->segment(motion, 0.0, Sides::both, hint);
+      const SweptHit hit = slide.relief->view(hint).first_touch(motion, Sides::both);
       const double skin = slide.relief->skin() / (2.0 * way.norm());
       if (!crossing.possible) {
         ASSERT_FALSE(hit.hit) << slide.name << " at " << i;

@@ -278,8 +278,9 @@ void expect_followed_on_sphere(MesostructureKind kind, int subdivisions, Mapping
         const Vec3 base = point_on(mesh, face, barycentric);
         const double z = height_at_force(scene, state, base, normal, force, 2e-3, -1e-3) + force / stiffness;
         // Rays of the shell lean over a coarse base: the relief is where a probe that comes straight down meets it.
-        Hint hint;
-        const SweptHit met = surface->segment({base + 3e-3 * normal, base - 3e-3 * normal}, 0.0, Sides::front, hint);
+        SurfaceCache hint;
+        const SweptHit met =
+            surface->view(hint).first_touch({base + 3e-3 * normal, base - 3e-3 * normal}, Sides::front);
         ASSERT_TRUE(met.hit);
         // Next to a wall the height under the probe depends on where exactly it stands (amendment 16).
         if (met.contact.normal.dot(normal) < 0.8) continue;

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 
+#include "asperity/render/local_material.h"
 #include "tests/render/implicit_touch.h"
 
 namespace asperity::virtual_contact_point_test {
@@ -105,7 +106,7 @@ TEST(VirtualContactPoint, K_3_DirectionIsTheFacesBeyondAFewVoxelsFromAnEdge) {
 TEST(VirtualContactPoint, K_3_ForceShadingIsWrongOverTheWholeFace) {
   const TriangleMesh mesh = test::mesh_of(box_mesh(Vec3::Constant(2.0 * half)));
   const MeshSurface surface(TriangleIndex::build(mesh));
-  Hint hint;
+  SurfaceCache hint;
   PointTouch touch = literal();
   int shaded_wrong = 0;
   int felt_wrong = 0;
@@ -113,8 +114,8 @@ TEST(VirtualContactPoint, K_3_ForceShadingIsWrongOverTheWholeFace) {
   for (int i = -9; i <= 9; ++i) {
     for (int j = -9; j <= 9; ++j) {
       const Vec3 p(1.9e-3 * i, 1.9e-3 * j, half - 0.4e-3);
-      const Foot foot = surface.closest(p, infinity, hint);
-      const Vec3 shaded = interpolated_normal(surface.mesh(), foot.element, foot.barycentric);
+      const Foot foot = surface.view(hint).nearest(p, infinity);
+      const Vec3 shaded = interpolated_normal(surface.mesh(), foot.element, foot.at);
       ++places;
       shaded_wrong += angle_between(shaded, Vec3::UnitZ()) > 1.0 ? 1 : 0;
       felt_wrong += angle_between(pressed(touch, p).force, Vec3::UnitZ()) > 1.0 ? 1 : 0;

@@ -42,7 +42,7 @@ void expect_fillet_in_place(double opening_degrees, double height, double radius
     b /= b.sum();
     const ReliefFrame frame = surface->frame(face);
     const ReliefPoint point = surface->point(frame, b[1], b[2]);
-    worst = std::max(worst, off_fillet(point.position, opening, height, radius));
+    worst = std::max(worst, off_fillet(point.point, opening, height, radius));
     round += point.jet.height > height + 1e-9 ? 1 : 0;
     const Vec2 whole[3] = {Vec2(0.0, 0.0), Vec2(1.0, 0.0), Vec2(0.0, 1.0)};
     const HeightRange range = surface->range(frame, whole);
@@ -70,8 +70,8 @@ TEST(Fillet, convex_folds_stay_as_they_are) {
   for (int i = 0; i < 1000; ++i) {
     const std::uint32_t face = random_face(rng, kept->base().mesh());
     const Vec3 b = random_barycentric(rng);
-    const Vec3 one = kept->point(kept->frame(face), b[1], b[2]).position;
-    ASSERT_LT((one - filled->point(filled->frame(face), b[1], b[2]).position).norm(), 1e-9);
+    const Vec3 one = kept->point(kept->frame(face), b[1], b[2]).point;
+    ASSERT_LT((one - filled->point(filled->frame(face), b[1], b[2]).point).norm(), 1e-9);
   }
 }
 
@@ -95,10 +95,10 @@ TEST(Fillet, gradient_is_that_of_the_value) {
     const Vec3 p = frame.prism.point({b[1], b[2], height + rng.uniform(-0.2e-3, 0.2e-3)});
     const Vec3 way = random_direction(rng);
     constexpr double h = 1e-8;
-    Hint hint;
-    const FieldSample here = surface->eval(p, hint);
-    const double ahead = surface->eval(p + h * way, hint).value - here.value;
-    const double behind = here.value - surface->eval(p - h * way, hint).value;
+    SurfaceCache cache;
+    const FieldSample here = surface->eval(p, cache);
+    const double ahead = surface->eval(p + h * way, cache).value - here.value;
+    const double behind = here.value - surface->eval(p - h * way, cache).value;
     // Where a wall begins to hold the ball the slopes of both sides differ.
     if (std::abs(ahead - behind) > 1e-4 * h) continue;
     ++checked;
@@ -224,8 +224,8 @@ struct Cup {
     stroke.approach_height = 4e-3;
     stroke.sample_spacing = 2e-4;
     return must(build_stroke(stroke, [&](const Vec3& p) {
-      Hint hint;
-      const Foot foot = open->closest(p, infinity, hint);
+      SurfaceCache cache;
+      const Foot foot = open->view(cache).nearest(p, infinity);
       return SurfacePoint{foot.point, foot.normal.dot(foot.point) > 0.0 ? Vec3(-foot.normal) : foot.normal};
     }));
   }
@@ -237,14 +237,15 @@ struct Cup {
     SafetyStage safety = must(SafetyStage::build(SafetySettings::from_profile(profile)));
     const Scene scene = scene_of(surface, law);
     ProxyState state;
+    ProxyCache cache;
     Touch touch;
     double work = 0.0;
     double least = infinity;
     int ticks = 0;
     Vec3 last_place = device.position();
     Vec3 last_force = Vec3::Zero();
-    run_session([&](const ProbeSample& probe, Seconds dt) { return step(scene, state, probe, dt); }, device, safety,
-                SessionSettings{},
+    run_session([&](const ProbeSample& probe, Seconds dt) { return step(scene, state, cache, probe, dt); }, device,
+                safety, SessionSettings{},
                 [&](const TraceRecord& record) {
                   const Vec3 place = device.position();
                   work += 0.5 * (last_force + record.commanded).dot(place - last_place);

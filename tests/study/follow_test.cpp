@@ -76,12 +76,12 @@ TEST(FollowError, IsTheShareOfTheLargestDeviationInTheVolume) {
   const auto field = sampled(cube(0.05, 11), [](const Vec3& p) { return 5.0 + 100.0 * p.x(); });
   const auto surface = surface_of(field, 4.0);
   EXPECT_NEAR(largest_deviation(*surface), 6.0, 1e-5);
-  IsoHint hint;
-  EXPECT_NEAR(follow_error(*surface, Vec3(-0.01, 0.02, 0.01), hint), 0.0, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(0.02, 0.0, 0.0), hint), 0.5, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(0.05, 0.0, 0.0), hint), 1.0, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(-0.04, 0.0, 0.0), hint), 0.5, 1e-6);
-  EXPECT_TRUE(std::isnan(follow_error(*surface, Vec3(0.06, 0.0, 0.0), hint)));
+  CellCache cache;
+  EXPECT_NEAR(follow_error(*surface, Vec3(-0.01, 0.02, 0.01), cache), 0.0, 1e-6);
+  EXPECT_NEAR(follow_error(*surface, Vec3(0.02, 0.0, 0.0), cache), 0.5, 1e-6);
+  EXPECT_NEAR(follow_error(*surface, Vec3(0.05, 0.0, 0.0), cache), 1.0, 1e-6);
+  EXPECT_NEAR(follow_error(*surface, Vec3(-0.04, 0.0, 0.0), cache), 0.5, 1e-6);
+  EXPECT_TRUE(std::isnan(follow_error(*surface, Vec3(0.06, 0.0, 0.0), cache)));
 }
 
 // --- detection ---
@@ -171,13 +171,14 @@ std::vector<TraceRecord> run(const Scene& scene, const StrokePath& path) {
   settings.bandwidth = 100.0;
   IdealProbe probe = IdealProbe::build(path, settings).value();
   ProxyState state;
+  ProxyCache cache;
   std::vector<TraceRecord> records;
   while (!probe.finished()) {
     TraceRecord record;
     record.tick = records.size();
     record.dt = Seconds(1.0 / rate);
     record.probe = probe.read();
-    record.rendered = step(scene, state, record.probe, record.dt);
+    record.rendered = step(scene, state, cache, record.probe, record.dt);
     record.commanded = record.rendered.wrench.force;
     record.hand = probe.aim();
     probe.apply(record.commanded, record.dt);

@@ -23,9 +23,9 @@ StrokePath over_the_top(const Scene& scene) {
   settings.speed = 0.05;
   const IsoSurface& iso = *iso_of(scene.instances()[0].surface);
   return build_stroke(settings,
-                      [&, hint = IsoHint()](const Vec3& p) mutable {
-                        const Foot foot = iso.view().closest(p, infinity, hint);
-                        return SurfacePoint{foot.point, iso.view().outward(foot.point, hint)};
+                      [&, cache = CellCache()](const Vec3& p) mutable {
+                        const Foot foot = iso.view(cache).nearest(p, infinity);
+                        return SurfacePoint{foot.point, iso.view(cache).outward(foot.point)};
                       })
       .value();
 }

@@ -107,12 +107,13 @@ TEST(PathScore, T11_OwnPathOfTheReferenceLawScoresZero) {
   const Scene scene = test::scene_of(waves.surface(), ProxyLaw{});
   std::vector<TraceRecord> records;
   ProxyState state;
+  ProxyCache cache;
   for (int i = 0; i < 800; ++i) {
     TraceRecord record;
     record.dt = test::tick;
     record.probe.time = i * test::tick;
     record.probe.pose.position = waves.point(-5e-3 + 1e-5 * i) + Vec3(0.0, 0.4e-3 - std::min(1e-3, 5e-6 * i), 0.0);
-    record.rendered = step(scene, state, record.probe, record.dt);
+    record.rendered = step(scene, state, cache, record.probe, record.dt);
     records.push_back(record);
   }
   for (const PathPlace place : {PathPlace::probe, PathPlace::surface}) {

@@ -128,7 +128,7 @@ TEST(Picture, SameInputsGiveTheSamePictureWithAnyNumberOfThreads) {
   settings.threads = 3;
   const auto three = render_picture(scene, path, records, settings);
   ASSERT_TRUE(one.ok() && three.ok());
-  // Hints are caches: an answer may differ in its last bits, a colour by one step.
+  // What is remembered is a cache: an answer may differ in its last bits, a colour by one step.
   ASSERT_EQ(one->image.samples.size(), three->image.samples.size());
   int different = 0;
   for (std::size_t i = 0; i < one->image.samples.size(); ++i)

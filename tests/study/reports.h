@@ -1,6 +1,7 @@
 #pragma once
 // Reports of real runs on small scenes, for the tests of their pages.
 
+#include "asperity/render/law_registry.h"
 #include "asperity/study/report.h"
 #include "tests/render/volumes.h"
 #include "tests/study/synthetic.h"

@@ -96,8 +96,9 @@ inline std::vector<TraceRecord> records_along(const StrokePath& path,
 inline std::vector<TraceRecord> rendered_along(const StrokePath& path, const Scene& scene) {
   std::vector<TraceRecord> records = records_along(path, [](const Vec3&, double) { return Vec3(Vec3::Zero()); });
   ProxyState state;
+  ProxyCache cache;
   for (TraceRecord& record : records) {
-    record.rendered = step(scene, state, record.probe, record.dt);
+    record.rendered = step(scene, state, cache, record.probe, record.dt);
     record.commanded = record.rendered.wrench.force;
   }
   return records;

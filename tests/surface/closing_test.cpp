@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "asperity/surface/mesh_view.h"
+#include "asperity/surface/relief_view.h"
 #include "tests/surface/folded.h"
 
 namespace asperity::closing_test {
@@ -38,7 +40,7 @@ void expect_fillet(double opening_degrees, double height, double radius, double 
   for (int i = 0; i < 4000; ++i) {
     const std::uint32_t face = random_face(rng, surface.base().mesh());
     const Vec3 barycentric = random_barycentric(rng);
-    const Vec3 p = surface.point(surface.frame(face), barycentric[1], barycentric[2]).position;
+    const Vec3 p = surface.point(surface.frame(face), barycentric[1], barycentric[2]).point;
     // Where the sheet ends the ball comes in from beside it.
     if (std::abs(p.y()) > 0.5 * side - radius) continue;
     worst = std::max(worst, off_fillet(p, opening, height, radius));
@@ -88,12 +90,12 @@ TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their
   constexpr double step = 4e-6;
   const int count = static_cast<int>(width / step) + 1;
   const int reach = static_cast<int>(radius / step);
-  Hint hint;
+  SurfaceCache cache;
   std::vector<double> height;
   for (int i = 0; i < count; ++i) {
     const double x = -0.5 * width + i * step;
-    const Foot foot = open->base().closest(Vec3(x, 1e-3, 0.0), infinity, hint);
-    height.push_back(open->height(open->frame(foot.element), foot.barycentric[1], foot.barycentric[2]).height);
+    const Foot foot = open->base().view(cache).nearest(Vec3(x, 1e-3, 0.0), infinity);
+    height.push_back(open->height(open->frame(foot.element), foot.at[1], foot.at[2]).height);
   }
   std::vector<double> cap;
   for (int k = -reach; k <= reach; ++k) cap.push_back(std::sqrt(radius * radius - k * k * step * step));
@@ -113,9 +115,9 @@ TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their
   double deepest = 0.0;
   for (int i = count / 6; i < 5 * count / 6; i += 7) {
     const double x = -0.5 * width + i * step;
-    const Foot foot = result.surface.base().closest(Vec3(x, 1e-3, 0.0), infinity, hint);
+    const Foot foot = result.surface.base().view(cache).nearest(Vec3(x, 1e-3, 0.0), infinity);
     const ReliefFrame frame = result.surface.frame(foot.element);
-    const double felt = result.surface.height(frame, foot.barycentric[1], foot.barycentric[2]).height;
+    const double felt = result.surface.height(frame, foot.at[1], foot.at[2]).height;
     const auto k = static_cast<std::size_t>(i);
     worst = std::max(worst, std::abs(felt - right[k]));
     deepest = std::max(deepest, right[k] - height[k]);
@@ -155,15 +157,15 @@ std::shared_ptr<const ReliefSurface> ringed_cup() {
 double least_freedom(const ReliefSurface& surface, double radius, std::uint64_t seed, int count) {
   Rng rng(seed);
   double least = 1.0;
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < count; ++i) {
     const std::uint32_t face = random_face(rng, surface.base().mesh());
     Vec3 b = random_barycentric(rng);
     if (i % 2 == 0) b[static_cast<int>(rng.below(3))] *= 0.1;
     b /= b.sum();
     const ReliefPoint point = surface.point(surface.frame(face), b[1], b[2]);
-    if (point.position.z() > -1.5 * radius) continue;
-    const Foot foot = surface.closest(point.position + radius * point.normal(), 1.01 * radius, hint);
+    if (point.point.z() > -1.5 * radius) continue;
+    const Foot foot = surface.view(cache).nearest(point.point + radius * point.front, 1.01 * radius);
     if (foot.found()) least = std::min(least, foot.distance / radius);
   }
   return least;

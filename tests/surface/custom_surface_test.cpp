@@ -1,11 +1,12 @@
 // Surfaces of one's own against formulas, parametric surfaces, and plain sampling of the field.
 
-#include "asperity/surface/custom_surface.h"
+#include "asperity/surface/custom_view.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/surface/parametric_surface.h"
+#include "asperity/surface/parametric_view.h"
+#include "tests/surface/balls.h"
 #include "tests/surface/custom_fields.h"
 
 namespace asperity::custom_surface_test {
@@ -48,16 +49,14 @@ RC_GTEST_PROP(CustomSurface, BallAnswersAsTheParametricSphereDoes, ()) {
   static const ParametricSurface sphere = *ParametricSurface::build(settings);
   const Vec3 p = random_place(0.05);
   RC_PRE(p.norm() > 1e-4);
-  Hint mine;
-  Hint theirs;
-  const Foot foot = ball.closest(p, infinity, mine);
+  const Foot foot = ball.view().nearest(p, infinity);
   RC_ASSERT(foot.found());
   RC_ASSERT((foot.point - 0.03 * p.normalized()).norm() < ball.skin());
-  RC_ASSERT(std::abs(foot.distance - sphere.closest(p, infinity, theirs).distance) < ball.skin());
+  RC_ASSERT(std::abs(foot.distance - sphere.view().nearest(p, infinity).distance) < ball.skin());
   const Segment motion{p, random_place(0.05)};
   for (const Sides sides : {Sides::front, Sides::both}) {
-    const SweptHit own = ball.segment(motion, 0.0, sides, mine);
-    const SweptHit other = sphere.segment(motion, 0.0, sides, theirs);
+    const SweptHit own = ball.view().first_touch(motion, sides);
+    const SweptHit other = sphere.view().first_touch(motion, sides);
     const double apart = (motion.to - motion.from).norm();
     // A motion that just grazes may go either way.
     const Vec3 way = (motion.to - motion.from).normalized();
@@ -80,8 +79,7 @@ void expect_no_passing(const Field& field, const CustomSurface& surface, double 
   RC_PRE(length > 1e-4);
   const double step = 0.02 * surface.grain();
   const double sampled = sampled_touch(field, motion, step);
-  Hint hint;
-  const SweptHit hit = surface.segment(motion, 0.0, Sides::both, hint);
+  const SweptHit hit = surface.view().first_touch(motion, Sides::both);
   RC_ASSERT(hit.hit || !(sampled < infinity));
   if (!hit.hit) return;
   RC_ASSERT(hit.t <= sampled + 1e-9);
@@ -124,8 +122,7 @@ RC_GTEST_PROP(CustomSurface, FeetAreOnTheSurfaceAndSquareToIt, ()) {
   // The nearest point of a torus by its formula; on the axis and in the tube's middle there is no one.
   const double from_ring = std::hypot(around - field.radius, p.z());
   RC_PRE(around > 1e-3 && from_ring > 1e-4);
-  Hint hint;
-  const Foot foot = surface.closest(p, infinity, hint);
+  const Foot foot = surface.view().nearest(p, infinity);
   RC_ASSERT(foot.found());
   RC_ASSERT(std::abs(field.eval(foot.point).value) < surface.skin());
   RC_ASSERT(std::abs(foot.distance - std::abs(from_ring - field.tube)) < 2.0 * surface.skin());
@@ -133,33 +130,33 @@ RC_GTEST_PROP(CustomSurface, FeetAreOnTheSurfaceAndSquareToIt, ()) {
 
 TEST(CustomSurface, BallInACornerTouchesBothWalls) {
   const CustomSurface corner = made(Corner{});
-  Hint hint;
-  ContactSet contacts;
-  corner.contacts(Vec3(0.01, 0.0, 0.01), 0.01, Sides::front, hint, contacts);
-  ASSERT_EQ(contacts.size(), 2U);
+  // On either side of the middle the wall there is the nearer one.
+  const Foot feet[2] = {corner.view().nearest(Vec3(0.01, 0.0, 0.01 - 1e-7), 0.01 + corner.skin()),
+                        corner.view().nearest(Vec3(0.01 - 1e-7, 0.0, 0.01), 0.01 + corner.skin())};
   double sum = 0.0;
-  for (const Foot& foot : contacts) {
+  for (const Foot& foot : feet) {
+    ASSERT_TRUE(foot.found());
     EXPECT_NEAR(foot.distance, 0.01, 1e-6);
     sum += std::abs(foot.normal.x()) + std::abs(foot.normal.z());
   }
   EXPECT_NEAR(sum, 2.0, 1e-3);
-  EXPECT_LT(std::abs(contacts[0].normal.dot(contacts[1].normal)), 1e-3);
+  EXPECT_LT(std::abs(feet[0].normal.dot(feet[1].normal)), 1e-3);
 }
 
 TEST(CustomSurface, MovingBallStopsARadiusBefore) {
   const CustomSurface ball = made(Ball{0.03});
-  Hint hint;
-  const SweptHit hit = ball.segment({Vec3(0.0, 0.004, 0.1), Vec3(0.0, 0.004, 0.0)}, 0.01, Sides::front, hint);
-  ASSERT_TRUE(hit.hit);
+  const double t = ball_touch({Vec3(0.0, 0.004, 0.1), Vec3(0.0, 0.004, 0.0)}, 0.01,
+                              [&](const Vec3& p) { return ball.view().nearest(p, infinity); });
+  ASSERT_LE(t, 1.0);
   const double z = std::sqrt(0.04 * 0.04 - 0.004 * 0.004);
-  EXPECT_NEAR(0.1 * (1.0 - hit.t), z, 1e-6);
-  EXPECT_FALSE(ball.segment({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, 0.0, Sides::front, hint).hit);
-  EXPECT_TRUE(ball.segment({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, 0.0, Sides::both, hint).hit);
+  EXPECT_NEAR(0.1 * (1.0 - t), z, 1e-6);
+  EXPECT_FALSE(ball.view().first_touch({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, Sides::front).hit);
+  EXPECT_TRUE(ball.view().first_touch({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, Sides::both).hit);
 }
 
-/// A ball that answers its nearest point itself, and says so by its element.
-struct OwnClosest : Ball {
-  [[nodiscard]] Foot closest(const Vec3& p, double bound, Hint&) const noexcept {
+/// A ball that answers its nearest point and its first touch itself, and says so by its element.
+struct OwnQueries : Ball {
+  [[nodiscard]] Foot nearest(const Vec3& p, double bound) const noexcept {
     Foot foot;
     const double length = p.norm();
     if (std::abs(length - radius) > bound || !(length > 0.0)) return foot;
@@ -169,17 +166,34 @@ struct OwnClosest : Ball {
     foot.element = 7;
     return foot;
   }
+  /// Of ways to the centre alone.
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides) const noexcept {
+    SweptHit hit;
+    const double length = motion.from.norm();
+    if (!(length > radius)) return hit;
+    hit.hit = true;
+    hit.t = 1.0 - radius / length;
+    hit.contact = nearest(motion.from, infinity);
+    hit.contact.element = 8;
+    return hit;
+  }
 };
 
 TEST(CustomSurface, WhatATypeDoesItselfIsTaken) {
-  const CustomSurface surface = made(OwnClosest{{0.03}});
-  Hint hint;
-  EXPECT_EQ(surface.closest(Vec3(0.04, 0.0, 0.0), infinity, hint).element, 7U);
-  EXPECT_FALSE(surface.closest(Vec3(0.04, 0.0, 0.0), 0.009, hint).found());
-  ContactSet contacts;
-  surface.contacts(Vec3(0.04, 0.0, 0.0), 0.01, Sides::front, hint, contacts);
-  ASSERT_EQ(contacts.size(), 1U);
-  EXPECT_EQ(contacts[0].element, 7U);
+  const CustomSurface surface = made(OwnQueries{{0.03}});
+  const Vec3 p(0.04, 0.0, 0.0);
+  EXPECT_EQ(surface.view().nearest(p, infinity).element, 7U);
+  EXPECT_FALSE(surface.view().nearest(p, 0.009).found());
+  const Foot touched = surface.view().nearest(p, 0.01 + surface.skin());
+  ASSERT_TRUE(touched.found());
+  EXPECT_EQ(touched.element, 7U);
+  EXPECT_EQ(touched.at, touched.point);
+  const SweptHit hit = surface.view().first_touch({p, Vec3::Zero()}, Sides::front);
+  ASSERT_TRUE(hit.hit);
+  EXPECT_EQ(hit.t, 0.25);
+  EXPECT_EQ(hit.side, 1.0);
+  EXPECT_EQ(hit.contact.element, 8U);
+  EXPECT_EQ(hit.contact.at, hit.contact.point);
 }
 
 /// A ball with something wrong with it.

@@ -16,7 +16,7 @@ TEST(ImplicitSurface, AnswersWithTheDistanceOfWhatItWasMadeFrom) {
   const ImplicitSurface surface =
       ImplicitSurface::build({grid, nullptr, nullptr, CellReconstruction::smooth, 0.0}).value();
   std::mt19937_64 generator(1);
-  Hint hint;
+  SurfaceCache cache;
   int asked = 0;
   for (int n = 0; n < 4000; ++n) {
     const Vec3 p = test::random_point(generator, 0.023);
@@ -28,10 +28,10 @@ TEST(ImplicitSurface, AnswersWithTheDistanceOfWhatItWasMadeFrom) {
     for (int a = 0; a < 3; ++a) near += q[a] > 0.02 - 0.003 ? 1 : 0;
     if (near != 1) continue;
     ++asked;
-    const FieldSample sample = surface.eval(p, hint);
+    const FieldSample sample = surface.eval(p, cache);
     EXPECT_NEAR(sample.value, exact, 1e-8);
     EXPECT_NEAR(sample.gradient.norm(), 1.0, 1e-5);
-    const Foot foot = surface.closest(p, 0.01, hint);
+    const Foot foot = surface.view(cache).nearest(p, 0.01);
     ASSERT_TRUE(foot.found());
     EXPECT_NEAR(foot.distance, std::abs(exact), 1e-8);
   }
@@ -43,7 +43,7 @@ TEST(ImplicitSurface, TheFirstTouchOfAMotionIsExact) {
   const ImplicitSurface surface =
       ImplicitSurface::build({grid, nullptr, nullptr, CellReconstruction::smooth, 0.0}).value();
   std::mt19937_64 generator(2);
-  Hint hint;
+  SurfaceCache cache;
   int hits = 0;
   for (int n = 0; n < 2000; ++n) {
     const Segment motion{0.05 * test::random_point(generator, 1.0).normalized(), test::random_point(generator, 0.05)};
@@ -54,7 +54,7 @@ TEST(ImplicitSurface, TheFirstTouchOfAMotionIsExact) {
     const double t = root >= 0.0 ? (-b - std::sqrt(root)) / d.squaredNorm() : 2.0;
     // Grazing passes are decided by the interpolation.
     if (t < 0.0 || std::abs(root) < 1e-9 || std::abs(t - 1.0) < 1e-4) continue;
-    const SweptHit hit = surface.segment(motion, 0.0, Sides::front, hint);
+    const SweptHit hit = surface.view(cache).first_touch(motion, Sides::front);
     EXPECT_EQ(hit.hit, t <= 1.0) << n;
     if (!hit.hit) continue;
     ++hits;

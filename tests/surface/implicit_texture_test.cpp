@@ -65,24 +65,24 @@ std::shared_ptr<const ScalarField> field_of(const SparseGrid& grid,
   return std::make_shared<const ScalarField>(std::make_shared<const SparseGrid>(grid), reconstruction);
 }
 
-IsoView surface_of(const ScalarField& field) {
-  return {&field, 0, 0.0, 1.0};
+IsoView surface_of(const ScalarField& field, CellCache& cells) {
+  return {&field, 0, 0.0, 1.0, &cells};
 }
 
 /// Height of the zero set over (x, y), coming down from the band's upper part.
-double height_at(const ScalarField& field, double x, double y, IsoHint& hint, double reach) {
-  const IsoCrossing crossing = surface_of(field).first_crossing({Vec3(x, y, reach), Vec3(x, y, -reach)}, hint);
+double height_at(const ScalarField& field, double x, double y, CellCache& cells, double reach) {
+  const IsoCrossing crossing = surface_of(field, cells).first_crossing({Vec3(x, y, reach), Vec3(x, y, -reach)});
   EXPECT_TRUE(crossing.found) << x;
   return crossing.point.z();
 }
 
 /// Half of what lies between the highest and the lowest place of the zero set along x.
 double amplitude_along_x(const ScalarField& field, double from, double to, double reach) {
-  IsoHint hint;
+  CellCache cells;
   double lowest = infinity;
   double highest = -infinity;
   for (double x = from; x <= to; x += 0.1 * voxel) {
-    const double z = height_at(field, x, 0.3 * voxel, hint, reach);
+    const double z = height_at(field, x, 0.3 * voxel, cells, reach);
     lowest = std::min(lowest, z);
     highest = std::max(highest, z);
   }
@@ -238,13 +238,13 @@ TEST(CoatHeight, PutsTheImageWhereTheTextureCoordinatesSay) {
   EXPECT_NEAR(result.lowest, 0.0, 1e-9);
   EXPECT_NEAR(result.highest, 1e-3, 1e-9);
   const auto field = field_of(result.grid);
-  IsoHint hint;
+  CellCache cells;
   for (double y = -17.0; y <= 17.0; y += 1.7) {
     for (double x = -17.0; x <= 17.0; x += 1.3) {
       const bool inside = x > 0.0 && x < 10.0 && y > 0.0;
       const bool near_border = std::min({std::abs(x), std::abs(x - 10.0), std::abs(y)}) < 2.0;
       if (near_border) continue;
-      EXPECT_NEAR(height_at(*field, x * voxel, y * voxel, hint, 3.5 * voxel), inside ? 1e-3 : 0.0, 1e-7)
+      EXPECT_NEAR(height_at(*field, x * voxel, y * voxel, cells, 3.5 * voxel), inside ? 1e-3 : 0.0, 1e-7)
           << x << " " << y;
     }
   }
@@ -321,9 +321,9 @@ TEST(Textured, RoughnessMultipliesTheHeight) {
   const TexturedPotential result =
       must_texture(SparseGrid::build(source).value(), constant_height(voxel), Redistancing::none);
   const auto field = field_of(result.grid);
-  IsoHint hint;
-  EXPECT_NEAR(height_at(*field, 8.0 * voxel, 0.0, hint, 3.0 * voxel), 0.25 * voxel, 1e-8);
-  EXPECT_NEAR(height_at(*field, -8.0 * voxel, 0.0, hint, 3.0 * voxel), voxel, 1e-8);
+  CellCache cells;
+  EXPECT_NEAR(height_at(*field, 8.0 * voxel, 0.0, cells, 3.0 * voxel), 0.25 * voxel, 1e-8);
+  EXPECT_NEAR(height_at(*field, -8.0 * voxel, 0.0, cells, 3.0 * voxel), voxel, 1e-8);
   EXPECT_NEAR(result.lowest, 0.25 * voxel, 1e-9);
   EXPECT_NEAR(result.highest, voxel, 1e-9);
 }
@@ -403,23 +403,23 @@ TEST(Textured, K_8_RecoversAmplitudeWithinFivePerCentFromSixVoxelsOn) {
 }
 
 /// Force of the consistent virtual contact point, -grad(k f^2 / 2), inside (N).
-Vec3 contact_force(const ScalarField& field, const Vec3& p, IsoHint& hint) {
+Vec3 contact_force(const ScalarField& field, const Vec3& p, CellCache& cells) {
   constexpr double stiffness = 1000.0;
   FieldJet jet;
-  if (!surface_of(field).sample(p, hint, jet) || !(jet.value < 0.0)) return Vec3::Zero();
+  if (!surface_of(field, cells).sample(p, jet) || !(jet.value < 0.0)) return Vec3::Zero();
   return -stiffness * jet.value * jet.gradient;
 }
 
 /// Largest change of force from place to place around the edge of a box of 40 mm, at `depth` under its faces.
 double largest_change(const ScalarField& field, double depth, double way) {
   const double wall = 0.02 - depth;
-  IsoHint hint;
-  Vec3 previous = contact_force(field, Vec3(0.01, 0.003, wall), hint);
+  CellCache cells;
+  Vec3 previous = contact_force(field, Vec3(0.01, 0.003, wall), cells);
   double largest = 0.0;
   for (double s = way; s <= 2.0 * (wall - 0.01); s += way) {
     const double top = wall - 0.01;
     const Vec3 p = s < top ? Vec3(0.01 + s, 0.003, wall) : Vec3(wall, 0.003, wall - (s - top));
-    const Vec3 force = contact_force(field, p, hint);
+    const Vec3 force = contact_force(field, p, cells);
     largest = std::max(largest, (force - previous).norm());
     previous = force;
   }
@@ -476,13 +476,13 @@ TEST(Textured, AFlatTextureMovesTheSurfaceAndKeepsTheDistance) {
   EXPECT_NEAR(result.grid.outside(), 3.0 * voxel, 1e-12);
   EXPECT_NEAR(result.grid.inside(), -4.0 * voxel, 1e-12);
   const auto field = field_of(result.grid);
-  IsoHint hint;
+  CellCache cells;
   Rng rng(5);
   for (int i = 0; i < 500; ++i) {
     const Vec3 d = Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)).normalized();
     const double r = 0.017 + rng.uniform(-2.0, 1.0) * voxel;
     FieldJet jet;
-    ASSERT_TRUE(surface_of(*field).sample(r * d, hint, jet));
+    ASSERT_TRUE(surface_of(*field, cells).sample(r * d, jet));
     EXPECT_NEAR(jet.value, r - 0.017, 2e-3 * voxel);
     EXPECT_GT(jet.gradient.dot(d), 0.995);
   }
@@ -500,8 +500,8 @@ TEST(Textured, RedistancedPointsHoldTheDistanceToTheTexturedZeroSet) {
     const SparseSource source = redistanced.grid.source();
     const SparseSource before = none.grid.source();
     const auto field = field_of(none.grid);
-    const IsoView view = surface_of(*field);
-    IsoHint hint;
+    CellCache cells;
+    const IsoView view = surface_of(*field, cells);
     int compared = 0;
     int wrong = 0;
     for (std::size_t b = 0; b < source.blocks.size(); b += 3) {
@@ -513,8 +513,7 @@ TEST(Textured, RedistancedPointsHoldTheDistanceToTheTexturedZeroSet) {
         const Vec3 p =
             h * Vec3(8.0 * block.at[0] + static_cast<double>(n % 8), 8.0 * block.at[1] + static_cast<double>(n / 8 % 8),
                      8.0 * block.at[2] + static_cast<double>(n / 64));
-        hint.has_foot = false;
-        const Foot foot = view.closest(p, std::abs(value) + 0.5 * h, hint);
+        const Foot foot = view.nearest(p, std::abs(value) + 0.5 * h);
         ASSERT_TRUE(foot.found());
         ++compared;
         if (std::abs(std::abs(value) - foot.distance) > allowed * h) ++wrong;
@@ -535,16 +534,16 @@ TEST(Textured, ZeroSetStaysWhereTheTexturePutsIt) {
        {std::pair(Redistancing::normalised, 0.1), std::pair(Redistancing::redistanced, 0.05)}) {
     const auto field = field_of(must_texture(*grid, height, mode).grid);
     Rng rng(9);
-    IsoHint hint;
-    IsoHint other;
+    CellCache cells;
+    CellCache other;
     double squares = 0.0;
     double largest = 0.0;
     constexpr int count = 1000;
     for (int i = 0; i < count; ++i) {
       const Vec3 d = Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)).normalized();
-      const IsoCrossing a = surface_of(*none).first_crossing({0.019 * d, 0.013 * d}, hint);
+      const IsoCrossing a = surface_of(*none, cells).first_crossing({0.019 * d, 0.013 * d});
       ASSERT_TRUE(a.found);
-      const Foot foot = surface_of(*field).closest(a.point, voxel, other);
+      const Foot foot = surface_of(*field, other).nearest(a.point, voxel);
       ASSERT_TRUE(foot.found());
       squares += foot.distance * foot.distance;
       largest = std::max(largest, foot.distance);

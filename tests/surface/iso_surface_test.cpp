@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "asperity/surface/iso_descent.h"
 #include "tests/field/volumes.h"
+#include "tests/surface/balls.h"
 
 namespace asperity::test::iso_surface_test {
 namespace {
@@ -38,12 +38,12 @@ TEST_P(IsoEach, T5_first_crossing_is_that_of_fine_steps_on_rough_fields) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     const auto field = random_field(12, GetParam(), seed, 0.6);
     const IsoSurface surface = IsoSurface::build(field, 0.1, Inside::low).value();
-    IsoHint hint;
+    CellCache cells;
     for (int n = 0; n < 60; ++n) {
       const Vec3 from = random_point(generator, 0.049);
       const Vec3 to = n % 3 == 0 ? random_point(generator, 0.049) : Vec3(from + random_point(generator, 0.004));
       if (!field->contains(to)) continue;
-      const IsoCrossing found = surface.view().first_crossing({from, to}, hint);
+      const IsoCrossing found = surface.view(cells).first_crossing({from, to});
       double t = 0.0;
       if (marched(*field, {from, to}, 0.1, t)) {
         ASSERT_TRUE(found.found) << seed << " " << n;
@@ -67,13 +67,13 @@ TEST_P(IsoEach, M_3_no_speed_passes_a_sheet_thinner_than_a_cell) {
   const IsoSurface surface = IsoSurface::build(field, 0.0, Inside::low).value();
   std::mt19937_64 generator(2);
   std::uniform_real_distribution<double> side(-0.009, 0.009);
-  IsoHint hint;
+  CellCache cells;
   for (int n = 0; n < 20000; ++n) {
     const Vec3 from(side(generator), side(generator), 0.001 + 0.008 * std::abs(side(generator)) / 0.009);
     const Vec3 to(side(generator), side(generator), -from.z());
-    const IsoCrossing in = surface.view().first_crossing({from, to}, hint);
+    const IsoCrossing in = surface.view(cells).first_crossing({from, to});
     ASSERT_TRUE(in.found && in.inward);
-    const IsoCrossing out = surface.view().first_crossing({from, to}, hint, in.t + 1e-9);
+    const IsoCrossing out = surface.view(cells).first_crossing({from, to}, in.t + 1e-9);
     ASSERT_TRUE(out.found && !out.inward);
     // Thinner than a quarter of a cell.
     EXPECT_LT(std::abs((out.point - in.point).z()), 2.5e-4);
@@ -82,30 +82,33 @@ TEST_P(IsoEach, M_3_no_speed_passes_a_sheet_thinner_than_a_cell) {
 
 TEST(IsoSurface, FrontAloneIsPassedFromBehind) {
   const IsoSurface surface = IsoSurface::build(sphere_field(33), 0.03, Inside::low).value();
-  IsoHint hint;
+  CellCache cells;
   const Segment out{Vec3(0.001, 0.002, 0.0), Vec3(0.045, 0.002, 0.0)};
   const Segment through{Vec3(-0.045, 0.001, 0.003), Vec3(0.045, 0.001, 0.003)};
-  EXPECT_FALSE(surface.view().first_touch(out, Sides::front, hint).found);
-  EXPECT_TRUE(surface.view().first_touch(out, Sides::both, hint).found);
-  EXPECT_TRUE(surface.view().first_touch(through, Sides::front, hint).inward);
+  EXPECT_FALSE(surface.view(cells).first_touch(out, Sides::front).hit);
+  EXPECT_TRUE(surface.view(cells).first_touch(out, Sides::both).hit);
+  const SweptHit met = surface.view(cells).first_touch(through, Sides::front);
+  EXPECT_TRUE(met.hit);
+  EXPECT_EQ(met.side, 1.0);
   const Segment back{Vec3(0.0, 0.001, 0.003), Vec3(0.049, 0.001, 0.003)};
-  EXPECT_FALSE(surface.view().first_touch(back, Sides::front, hint).found);
+  EXPECT_FALSE(surface.view(cells).first_touch(back, Sides::front).hit);
   // The other inside turns front and back.
   const IsoSurface hollow = IsoSurface::build(sphere_field(33), 0.03, Inside::high).value();
-  EXPECT_TRUE(hollow.view().first_touch(out, Sides::front, hint).found);
-  EXPECT_LT(hollow.view().first_touch(out, Sides::front, hint).outward.x(), -0.9);
+  EXPECT_TRUE(hollow.view(cells).first_touch(out, Sides::front).hit);
+  const SweptHit entered = hollow.view(cells).first_touch(out, Sides::front);
+  EXPECT_LT(entered.side * entered.contact.normal.x(), -0.9);
 }
 
 TEST(IsoSurface, NestedShellsAreMetOneAfterTheOther) {
   const auto field = std::make_shared<const ScalarField>(
       sampled(cube_axes(0.05, 101), [](const Vec3& p) { return std::sin(p.norm() / 0.003); }));
   const IsoSurface surface = IsoSurface::build(field, 0.0, Inside::low).value();
-  IsoHint hint;
+  CellCache cells;
   const Segment motion{Vec3(0.0005, 0.0, 0.0001), Vec3(0.049, 0.001, 0.0)};
   double from = 0.0;
   int met = 0;
   for (;; ++met) {
-    const IsoCrossing crossing = surface.view().first_crossing(motion, hint, from);
+    const IsoCrossing crossing = surface.view(cells).first_crossing(motion, from);
     if (!crossing.found) break;
     // Shells at multiples of pi times 3 mm, turn by turn.
     EXPECT_NEAR(crossing.point.norm() / 0.003 / 3.14159265358979, met + 1, 0.02);
@@ -125,7 +128,7 @@ TEST_P(IsoEach, NearestPointIsThatOfADenseSampling) {
   const auto field = std::make_shared<const ScalarField>(sampled(cube_axes(0.03, 41, 0.3), f), GetParam());
   const IsoSurface surface = IsoSurface::build(field, 0.2, Inside::high).value();
   std::vector<Vec3> points;
-  IsoHint hint;
+  CellCache cells;
   for (int i = 0; i <= 120; ++i) {
     for (int j = 0; j <= 120; ++j) {
       for (int axis = 0; axis < 3; ++axis) {
@@ -136,7 +139,7 @@ TEST_P(IsoEach, NearestPointIsThatOfADenseSampling) {
         line.from[(axis + 2) % 3] = line.to[(axis + 2) % 3] = -0.03 + 0.0005 * j;
         double from = 0.0;
         for (;;) {
-          const IsoCrossing crossing = surface.view().first_crossing(line, hint, from);
+          const IsoCrossing crossing = surface.view(cells).first_crossing(line, from);
           if (!crossing.found) break;
           points.push_back(crossing.point);
           from = crossing.t + 1e-7;
@@ -149,8 +152,8 @@ TEST_P(IsoEach, NearestPointIsThatOfADenseSampling) {
     const Vec3 p = random_point(generator, 0.028);
     double nearest = infinity;
     for (const Vec3& point : points) nearest = std::min(nearest, (point - p).norm());
-    IsoHint fresh;
-    const Foot foot = surface.view().closest(p, 0.02, fresh);
+    CellCache fresh;
+    const Foot foot = surface.view(fresh).nearest(p, 0.02);
     ASSERT_TRUE(foot.found());
     EXPECT_NEAR(value_at(*field, foot.point), 0.2, 1e-6);
     EXPECT_NEAR(foot.distance, (foot.point - p).norm(), 1e-12);
@@ -158,8 +161,8 @@ TEST_P(IsoEach, NearestPointIsThatOfADenseSampling) {
     EXPECT_LE(foot.distance, nearest + 2e-7) << n;
     EXPECT_GE(foot.distance, nearest - 4e-4);
     // A bound below the distance finds nothing.
-    IsoHint none;
-    EXPECT_FALSE(surface.view().closest(p, 0.99 * foot.distance, none).found());
+    CellCache none;
+    EXPECT_FALSE(surface.view(none).nearest(p, 0.99 * foot.distance).found());
   }
 }
 
@@ -168,22 +171,22 @@ TEST_P(IsoEach, DescentComesToTheNearestPointAndNeverFarther) {
   const IsoSurface surface = IsoSurface::build(field, 0.03, Inside::low).value();
   std::mt19937_64 generator(9);
   for (int n = 0; n < 500; ++n) {
-    IsoHint hint;
+    CellCache cells;
     const Vec3 goal = random_point(generator, 1.0).normalized() * 0.027;
     const Vec3 around = (goal + random_point(generator, 0.012)).normalized() * 0.045;
-    const IsoCrossing start = surface.view().first_crossing({around, Vec3::Zero()}, hint);
+    const IsoCrossing start = surface.view(cells).first_crossing({around, Vec3::Zero()});
     ASSERT_TRUE(start.found);
-    IsoDescent descent;
-    descent.point = start.point;
-    descent.goal = goal;
-    descent.budget = 400;
+    const IsoView view = surface.view(cells);
+    Place place{view.element_of(start.cell), false, start.point};
+    IsoSpot spot = view.at(place, start.outward);
     double distance = (start.point - goal).norm();
-    const IsoEnd end = descend(surface.view(), descent, hint);
-    EXPECT_EQ(end, IsoEnd::rest);
-    EXPECT_LE((descent.point - goal).norm(), distance);
-    EXPECT_NEAR(value_at(*field, descent.point), 0.03, 1e-9);
+    const DescentEnd end = view.descend(place, spot, {.point = goal});
+    EXPECT_EQ(end, DescentEnd::rest);
+    EXPECT_EQ(place.at, spot.point);
+    EXPECT_LE((spot.point - goal).norm(), distance);
+    EXPECT_NEAR(value_at(*field, spot.point), 0.03, 1e-9);
     const double bound = GetParam() == CellReconstruction::smooth ? 1e-4 : 4e-2;
-    EXPECT_LT((descent.point - 0.03 * goal.normalized()).norm(), bound * 0.03);
+    EXPECT_LT((spot.point - 0.03 * goal.normalized()).norm(), bound * 0.03);
   }
 }
 
@@ -193,18 +196,18 @@ TEST(IsoSurface, EndsAtTheVolumesBorder) {
                             sampled(cube_axes(0.02, 21), [](const Vec3& p) { return p.z() + 0.1 * p.x(); })),
                         0.0, Inside::low)
           .value();
-  IsoHint hint;
+  CellCache cells;
   const Segment beside{Vec3(0.03, 0.0, 0.03), Vec3(0.03, 0.0, -0.03)};
-  EXPECT_FALSE(surface.view().first_crossing(beside, hint).found);
+  EXPECT_FALSE(surface.view(cells).first_crossing(beside).found);
   // In from outside the volume, under the surface: nothing is passed; out through it is.
   const Segment up{Vec3(0.0, 0.0, -0.05), Vec3(0.0, 0.0, 0.05)};
-  const IsoCrossing crossing = surface.view().first_crossing(up, hint);
+  const IsoCrossing crossing = surface.view(cells).first_crossing(up);
   EXPECT_TRUE(crossing.found && !crossing.inward);
-  IsoDescent descent;
-  descent.point = crossing.point;
-  descent.goal = Vec3(0.05, 0.0, -0.01);
-  EXPECT_EQ(descend(surface.view(), descent, hint), IsoEnd::rim);
-  EXPECT_NEAR(descent.point.x(), 0.02, 1e-9);
+  const IsoView view = surface.view(cells);
+  Place place{view.element_of(crossing.cell), false, crossing.point};
+  IsoSpot spot = view.at(place, crossing.outward);
+  EXPECT_EQ(view.descend(place, spot, {.point = Vec3(0.05, 0.0, -0.01)}), DescentEnd::rim);
+  EXPECT_NEAR(spot.point.x(), 0.02, 1e-9);
 }
 
 TEST(IsoSurface, RefusesAThresholdThatTheFieldNeverPasses) {
@@ -226,16 +229,17 @@ TEST(IsoSurface, BallStopsAtItsRadius) {
   const IsoSurface surface = IsoSurface::build(sphere_field(65), 0.03, Inside::low).value();
   std::mt19937_64 generator(12);
   for (int n = 0; n < 50; ++n) {
-    Hint hint;
+    SurfaceCache cache;
+    const IsoView view = surface.view(cache);
     const Vec3 from = random_point(generator, 1.0).normalized() * 0.045;
     const Vec3 to = -from + random_point(generator, 0.02);
-    const SweptHit hit = surface.segment({from, to}, 0.002, Sides::both, hint);
+    const double t = ball_touch({from, to}, 0.002, [&](const Vec3& p) { return view.nearest(p, infinity); });
     const Vec3 d = (to - from).normalized();
     const double nearest = (from - from.dot(d) * d).norm();
     if (nearest > 0.0325) continue;
     if (nearest > 0.0315) continue;  // grazing
-    ASSERT_TRUE(hit.hit);
-    EXPECT_NEAR((from + hit.t * (to - from)).norm(), 0.032, 2e-6);
+    ASSERT_LE(t, 1.0);
+    EXPECT_NEAR((from + t * (to - from)).norm(), 0.032, 2e-6);
   }
 }
 

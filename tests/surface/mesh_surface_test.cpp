@@ -13,12 +13,12 @@ TEST(MeshSurfaceEval, is_the_exact_signed_distance_of_a_box) {
   const Vec3 half(0.015, 0.01, 0.005);
   const auto box = bare(box_mesh(2.0 * half));
   Rng rng(1);
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 3000; ++i) {
     const Vec3 p = random_vector(rng, 0.02);
     const Vec3 over = p.cwiseAbs() - half;
     const double expected = over.cwiseMax(0.0).norm() + std::min(over.maxCoeff(), 0.0);
-    const FieldSample sample = box->eval(p, hint);
+    const FieldSample sample = box->eval(p, cache);
     ASSERT_NEAR(sample.value, expected, 1e-15) << p.transpose();
     ASSERT_NEAR(sample.gradient.norm(), 1.0, 1e-12);
     ASSERT_EQ(sample.height, 0.0);
@@ -28,16 +28,16 @@ TEST(MeshSurfaceEval, is_the_exact_signed_distance_of_a_box) {
 TEST(MeshSurfaceEval, gradient_agrees_with_finite_differences) {
   const auto surface = bare(random_closed_mesh(6, 2, 0.02, 0.4));
   Rng rng(2);
-  Hint hint;
+  SurfaceCache cache;
   int checked = 0;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 p = random_vector(rng, 0.03);
-    const FieldSample here = surface->eval(p, hint);
+    const FieldSample here = surface->eval(p, cache);
     const double h = 1e-8;
     Vec3 expected;
     for (int k = 0; k < 3; ++k) {
       expected[k] =
-          (surface->eval(p + h * Vec3::Unit(k), hint).value - surface->eval(p - h * Vec3::Unit(k), hint).value) /
+          (surface->eval(p + h * Vec3::Unit(k), cache).value - surface->eval(p - h * Vec3::Unit(k), cache).value) /
           (2.0 * h);
     }
     // The medial axis has measure zero; there the two sides of the difference see different feet.
@@ -50,9 +50,9 @@ TEST(MeshSurfaceEval, gradient_agrees_with_finite_differences) {
 
 TEST(MeshSurfaceEval, on_a_face_the_gradient_is_the_faces_normal) {
   const auto surface = bare(plane_grid(0.02, 0.02, 2, 2));
-  Hint hint;
+  SurfaceCache cache;
   const Vec3 corner = surface->mesh().positions()[4];
-  const FieldSample sample = surface->eval(corner, hint);
+  const FieldSample sample = surface->eval(corner, cache);
   EXPECT_EQ(sample.value, 0.0);
   EXPECT_EQ(sample.gradient, Vec3(0.0, 0.0, 1.0));
 }
@@ -95,14 +95,14 @@ TEST(MeshSurface, natural_sides_are_front_for_closed_meshes_alone) {
   EXPECT_EQ(bare(trial_mesh_e())->natural_sides(), Sides::both);
 }
 
-TEST(MeshSurface, answers_the_same_with_and_without_a_hint) {
+TEST(MeshSurface, answers_the_same_with_and_without_a_cache) {
   const auto surface = bare(random_closed_mesh(2, 3, 0.02, 0.4));
   Rng rng(14);
-  Hint kept;
+  SurfaceCache kept;
   Vec3 p = random_vector(rng, 0.02);
   for (int i = 0; i < 2000; ++i) {
     p += random_vector(rng, 2e-4);
-    Hint fresh;
+    SurfaceCache fresh;
     const FieldSample a = surface->eval(p, kept);
     const FieldSample b = surface->eval(p, fresh);
     ASSERT_EQ(a.value, b.value);

@@ -1,6 +1,6 @@
 // Parametric surfaces: derivatives, and queries against formulas and against dense sampling.
 
-#include "asperity/surface/parametric_surface.h"
+#include "asperity/surface/parametric_view.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "asperity/core/rng.h"
+#include "asperity/surface/tangents.h"
+#include "tests/surface/balls.h"
 
 namespace asperity::test::parametric_surface_test {
 namespace {
@@ -144,7 +146,7 @@ RC_GTEST_PROP(ParametricSurface, T8_parameter_gradients_and_bend_are_differences
   const ParametricJet here = s.jet(uv);
   Vec3 du;
   Vec3 dv;
-  ParametricSurface::parameter_gradients(here, du, dv);
+  parameter_gradients(here.u, here.v, du, dv);
   const Vec3 n = s.normal(here);
   RC_ASSERT(std::abs(du.dot(here.u) - 1.0) < 1e-12);
   RC_ASSERT(std::abs(dv.dot(here.v) - 1.0) < 1e-12);
@@ -199,22 +201,28 @@ TEST(ParametricSurface, NearestPlacesOfSphereTorusCylinderAndPlane) {
   const ParametricSurface torus = surface_of(ParametricShape::torus);
   const ParametricSurface cylinder = surface_of(ParametricShape::cylinder);
   const ParametricSurface plane = surface_of(ParametricShape::plane);
-  Hint hints[4];
+  const ParametricSurface* surfaces[4] = {&sphere, &torus, &cylinder, &plane};
+  Place last[4];
+  // Each search starts where the one before ended.
+  const auto nearest = [&](std::size_t which, const Vec3& p, double bound) {
+    const Foot foot = surfaces[which]->view().nearest(p, bound, last[which]);
+    if (foot.found()) last[which] = {foot.element, false, foot.at};
+    return foot;
+  };
   for (int i = 0; i < 1500; ++i) {
     const Vec3 p = random_in(rng, torus.bounds().grown(0.02));
     const double around = std::hypot(p.x(), p.y());
-    EXPECT_NEAR(sphere.closest(p, infinity, hints[0]).distance, std::abs(p.norm() - 0.03), 2e-10);
-    EXPECT_NEAR(torus.closest(p, infinity, hints[1]).distance, std::abs(std::hypot(around - 0.03, p.z()) - 0.01),
-                2e-10);
+    EXPECT_NEAR(nearest(0, p, infinity).distance, std::abs(p.norm() - 0.03), 2e-10);
+    EXPECT_NEAR(nearest(1, p, infinity).distance, std::abs(std::hypot(around - 0.03, p.z()) - 0.01), 2e-10);
     const double beyond = std::max({0.0, -p.z(), p.z() - 0.1});
-    EXPECT_NEAR(cylinder.closest(p, infinity, hints[2]).distance, std::hypot(around - 0.03, beyond), 2e-10);
+    EXPECT_NEAR(nearest(2, p, infinity).distance, std::hypot(around - 0.03, beyond), 2e-10);
     const Vec3 flat(std::clamp(p.x(), -0.05, 0.05), std::clamp(p.y(), -0.05, 0.05), 0.0);
-    EXPECT_NEAR(plane.closest(p, infinity, hints[3]).distance, (p - flat).norm(), 2e-10);
+    EXPECT_NEAR(nearest(3, p, infinity).distance, (p - flat).norm(), 2e-10);
   }
-  EXPECT_FALSE(sphere.closest(Vec3(0.0, 0.0, 0.05), 0.019, hints[0]).found());
-  EXPECT_TRUE(sphere.closest(Vec3(0.0, 0.0, 0.05), 0.021, hints[0]).found());
+  EXPECT_FALSE(nearest(0, Vec3(0.0, 0.0, 0.05), 0.019).found());
+  EXPECT_TRUE(nearest(0, Vec3(0.0, 0.0, 0.05), 0.021).found());
   // Where every place is the nearest one.
-  EXPECT_NEAR(sphere.closest(Vec3::Zero(), infinity, hints[0]).distance, 0.03, 1e-9);
+  EXPECT_NEAR(nearest(0, Vec3::Zero(), infinity).distance, 0.03, 1e-9);
 }
 
 TEST(ParametricSurface, NearestPlacesAgainstDenseSamplingOfEveryFeaturedShape) {
@@ -222,17 +230,18 @@ TEST(ParametricSurface, NearestPlacesAgainstDenseSamplingOfEveryFeaturedShape) {
   for (const ParametricShape shape : shapes) {
     const ParametricSurface s = surface_of(shape, true);
     const Net net = net_of(s, 600, 300);
-    Hint hint;
+    Place last;
     for (int i = 0; i < 25; ++i) {
       const Vec3 p = random_in(rng, s.bounds().grown(0.005));
-      if (i % 3 == 0) hint = {};
-      const Foot foot = s.closest(p, infinity, hint);
+      if (i % 3 == 0) last = {};
+      const Foot foot = s.view().nearest(p, infinity, last);
       ASSERT_TRUE(foot.found());
+      last = {foot.element, false, foot.at};
       double sampled = infinity;
       for (const Vec3& q : net.points) sampled = std::min(sampled, (p - q).norm());
       EXPECT_LE(foot.distance, sampled + 2e-10) << parametric_name(shape) << " " << i;
       // What was found is on the surface.
-      EXPECT_LT((s.jet(hint.parametric.uv).point - foot.point).norm(), 1e-12);
+      EXPECT_LT((s.jet(foot.at.head<2>()).point - foot.point).norm(), 1e-12);
       EXPECT_NEAR((p - foot.point).norm(), foot.distance, 1e-12);
     }
   }
@@ -242,7 +251,6 @@ TEST(ParametricSurface, SegmentsMeetSpheresToriAndCylindersWhereFormulasSay) {
   Rng rng(7);
   const ParametricSurface sphere = surface_of(ParametricShape::sphere);
   const ParametricSurface cylinder = surface_of(ParametricShape::cylinder);
-  Hint hint;
   int hits = 0;
   for (int i = 0; i < 4000; ++i) {
     const Segment g{random_in(rng, sphere.bounds().grown(0.03)), random_in(rng, sphere.bounds().grown(0.03))};
@@ -259,7 +267,7 @@ TEST(ParametricSurface, SegmentsMeetSpheresToriAndCylindersWhereFormulasSay) {
     for (const bool front : {false, true}) {
       const double t =
           first(d.squaredNorm(), d.dot(g.from), g.from.squaredNorm() - 9e-4, front, [](double) { return true; });
-      const SweptHit hit = sphere.segment(g, 0.0, front ? Sides::front : Sides::both, hint);
+      const SweptHit hit = sphere.view().first_touch(g, front ? Sides::front : Sides::both);
       ASSERT_EQ(hit.hit, t <= 1.0) << i;
       if (hit.hit) {
         EXPECT_NEAR(hit.t, t, 1e-9);
@@ -271,7 +279,7 @@ TEST(ParametricSurface, SegmentsMeetSpheresToriAndCylindersWhereFormulasSay) {
                              const double z = g.from.z() + at * d.z();
                              return z >= 0.0 && z <= 0.1;
                            });
-    const SweptHit hit = cylinder.segment(g, 0.0, Sides::both, hint);
+    const SweptHit hit = cylinder.view().first_touch(g, Sides::both);
     ASSERT_EQ(hit.hit, t <= 1.0) << i;
     if (hit.hit) {
       EXPECT_NEAR(hit.t, t, 1e-9);
@@ -285,18 +293,17 @@ TEST(ParametricSurface, SegmentsThroughPolesSeamsAndRimsMeetTheSurface) {
   const ParametricSurface sphere = surface_of(ParametricShape::sphere);
   const ParametricSurface torus = surface_of(ParametricShape::torus);
   const ParametricSurface plane = surface_of(ParametricShape::plane);
-  Hint hint;
-  EXPECT_NEAR(sphere.segment({Vec3(0, 0, 0.05), Vec3(0, 0, -0.05)}, 0.0, Sides::both, hint).t, 0.2, 1e-8);
-  EXPECT_NEAR(sphere.segment({Vec3(0.05, 0, 0), Vec3(-0.05, 0, 0)}, 0.0, Sides::both, hint).t, 0.2, 1e-8);
-  EXPECT_NEAR(torus.segment({Vec3(0.06, 0, 0), Vec3(0, 0, 0)}, 0.0, Sides::front, hint).t, 1.0 / 3.0, 1e-10);
-  EXPECT_NEAR(torus.segment({Vec3(0, 0, 0), Vec3(0.06, 0, 0)}, 0.0, Sides::front, hint).t, 1.0 / 3.0, 1e-10);
-  EXPECT_TRUE(plane.segment({Vec3(0.05, 0.05, 1), Vec3(0.05, 0.05, -1)}, 0.0, Sides::both, hint).hit);
-  EXPECT_FALSE(plane.segment({Vec3(0.0501, 0.05, 1), Vec3(0.0501, 0.05, -1)}, 0.0, Sides::both, hint).hit);
+  EXPECT_NEAR(sphere.view().first_touch({Vec3(0, 0, 0.05), Vec3(0, 0, -0.05)}, Sides::both).t, 0.2, 1e-8);
+  EXPECT_NEAR(sphere.view().first_touch({Vec3(0.05, 0, 0), Vec3(-0.05, 0, 0)}, Sides::both).t, 0.2, 1e-8);
+  EXPECT_NEAR(torus.view().first_touch({Vec3(0.06, 0, 0), Vec3(0, 0, 0)}, Sides::front).t, 1.0 / 3.0, 1e-10);
+  EXPECT_NEAR(torus.view().first_touch({Vec3(0, 0, 0), Vec3(0.06, 0, 0)}, Sides::front).t, 1.0 / 3.0, 1e-10);
+  EXPECT_TRUE(plane.view().first_touch({Vec3(0.05, 0.05, 1), Vec3(0.05, 0.05, -1)}, Sides::both).hit);
+  EXPECT_FALSE(plane.view().first_touch({Vec3(0.0501, 0.05, 1), Vec3(0.0501, 0.05, -1)}, Sides::both).hit);
   // Along the surface, just above it, and where a ray only touches.
-  EXPECT_FALSE(plane.segment({Vec3(-1, 0, 1e-8), Vec3(1, 0, 1e-8)}, 0.0, Sides::both, hint).hit);
-  EXPECT_TRUE(plane.segment({Vec3(-1, 0, 1e-8), Vec3(1, 0, -1e-8)}, 0.0, Sides::both, hint).hit);
-  EXPECT_FALSE(sphere.segment({Vec3(-1, 0, 0.03 + 1e-8), Vec3(1, 0, 0.03 + 1e-8)}, 0.0, Sides::both, hint).hit);
-  EXPECT_TRUE(sphere.segment({Vec3(-1, 0, 0.03 - 1e-8), Vec3(1, 0, 0.03 - 1e-8)}, 0.0, Sides::both, hint).hit);
+  EXPECT_FALSE(plane.view().first_touch({Vec3(-1, 0, 1e-8), Vec3(1, 0, 1e-8)}, Sides::both).hit);
+  EXPECT_TRUE(plane.view().first_touch({Vec3(-1, 0, 1e-8), Vec3(1, 0, -1e-8)}, Sides::both).hit);
+  EXPECT_FALSE(sphere.view().first_touch({Vec3(-1, 0, 0.03 + 1e-8), Vec3(1, 0, 0.03 + 1e-8)}, Sides::both).hit);
+  EXPECT_TRUE(sphere.view().first_touch({Vec3(-1, 0, 0.03 - 1e-8), Vec3(1, 0, 0.03 - 1e-8)}, Sides::both).hit);
 }
 
 TEST(ParametricSurface, SegmentsAgainstADenseNetOfEveryFeaturedShape) {
@@ -307,16 +314,15 @@ TEST(ParametricSurface, SegmentsAgainstADenseNetOfEveryFeaturedShape) {
     const int rows = 160;
     const Net net = net_of(s, columns, rows);
     const double size = s.bounds().diagonal();
-    Hint hint;
     int hits = 0;
     for (int i = 0; i < 40; ++i) {
       const Segment g{random_in(rng, s.bounds().grown(0.01)), random_in(rng, s.bounds().grown(0.01))};
-      const SweptHit hit = s.segment(g, 0.0, Sides::both, hint);
+      const SweptHit hit = s.view().first_touch(g, Sides::both);
       const double t = first_crossing(net, g);
       if (hit.hit) {
         ++hits;
         // On the surface and on the segment.
-        EXPECT_LT((s.jet(hint.parametric.uv).point - g.from - hit.t * (g.to - g.from)).norm(), 2e-9 * size);
+        EXPECT_LT((s.jet(hit.contact.at.head<2>()).point - g.from - hit.t * (g.to - g.from)).norm(), 2e-9 * size);
       }
       // Nothing that the net meets well before is passed; triangles cut off what is thinner than they are.
       const double slack = 0.03;
@@ -333,15 +339,14 @@ TEST(ParametricSurface, RidgesWithEdgesAreMetAndNearest) {
   settings.features = {ridges(0.001, 0.008, 0.3)};
   const ParametricSurface s = ParametricSurface::build(settings).value();
   Rng rng(13);
-  Hint hint;
   for (int i = 0; i < 30; ++i) {
     const Vec3 p(rng.uniform(-0.04, 0.04), rng.uniform(-0.04, 0.04), rng.uniform(0.002, 0.006));
     const Vec2 uv(p.x() + 0.05, p.y() + 0.05);
     const double height = settings.features[0].sample(uv).height;
-    const SweptHit down = s.segment({p, p - Vec3(0, 0, 0.01)}, 0.0, Sides::both, hint);
+    const SweptHit down = s.view().first_touch({p, p - Vec3(0, 0, 0.01)}, Sides::both);
     ASSERT_TRUE(down.hit);
     EXPECT_NEAR(p.z() - 0.01 * down.t, height, 1e-9);
-    const Foot foot = s.closest(p, infinity, hint);
+    const Foot foot = s.view().nearest(p, infinity, {down.contact.element, false, down.contact.at});
     double sampled = infinity;
     for (int k = 0; k < 400; ++k) {
       // The nearest place lies across the ridges.
@@ -359,34 +364,42 @@ TEST(ParametricSurface, BallsStopAtTheirRadius) {
   Rng rng(17);
   const ParametricSurface sphere = surface_of(ParametricShape::sphere);
   const ParametricSurface vase = surface_of(ParametricShape::vase, true);
-  Hint hint;
+  const Net net = net_of(vase, 600, 300);
   int hits = 0;
   for (int i = 0; i < 60; ++i) {
     const double r = rng.uniform(0.0005, 0.004);
     const Segment g{0.06 * random_in(rng, {Vec3::Constant(-1), Vec3::Constant(1)}).normalized(),
                     random_in(rng, sphere.bounds())};
-    const SweptHit hit = sphere.segment(g, r, Sides::front, hint);
+    const double touch = ball_touch(g, r, [&](const Vec3& p) { return sphere.view().nearest(p, infinity); });
     const Vec3 d = g.to - g.from;
     const double root = std::pow(d.dot(g.from), 2) - d.squaredNorm() * (g.from.squaredNorm() - std::pow(0.03 + r, 2));
     const double t = root < 0.0 ? 2.0 : (-d.dot(g.from) - std::sqrt(root)) / d.squaredNorm();
-    ASSERT_EQ(hit.hit, t >= 0.0 && t <= 1.0) << i;
-    if (hit.hit) {
-      EXPECT_NEAR(hit.t, t, 1e-5);
+    ASSERT_EQ(touch <= 1.0, t >= 0.0 && t <= 1.0) << i;
+    if (touch <= 1.0) {
+      EXPECT_NEAR(touch, t, 1e-5);
     }
-    const SweptHit other = vase.segment(g, r, Sides::both, hint);
-    if (!other.hit || other.t == 0.0) continue;
+    const double other = ball_touch(g, r, [&](const Vec3& p) { return vase.view().nearest(p, infinity); });
+    if (other > 1.0 || other == 0.0) continue;
     ++hits;
-    const Vec3 centre = g.from + other.t * d;
-    EXPECT_NEAR(vase.closest(centre, infinity, hint).distance, r, 1e-7);
+    const Vec3 centre = g.from + other * d;
+    EXPECT_NEAR(vase.view().nearest(centre, infinity).distance, r, 1e-7);
+    // It is the first touch: of a dense net of the surface nothing is nearer on the way, and something is there.
+    double sampled = infinity;
+    for (int k = 0; k <= 10; ++k) {
+      const Vec3 at = g.from + (0.1 * k * other) * d;
+      sampled = infinity;
+      for (const Vec3& q : net.points) sampled = std::min(sampled, (at - q).norm());
+      EXPECT_GT(sampled, r - 1e-7) << i;
+    }
+    EXPECT_LT(sampled, r + 1e-4) << i;
   }
   EXPECT_GT(hits, 10);
 }
 
-TEST(ParametricSurface, ContactsOfABallInAGroove) {
+TEST(ParametricSurface, BothFlanksOfAGrooveAreNearestToABallInIt) {
   ParametricSettings settings;
   settings.features = {grating(0.001, 0.008, 0.0)};
   const ParametricSurface s = ParametricSurface::build(settings).value();
-  Hint hint;
   // A valley lies at u = 4 mm + n 8 mm; a ball of more than its radius of curvature touches both flanks.
   const double x = 0.052 - 0.05;
   const double r = 0.004;
@@ -394,25 +407,27 @@ TEST(ParametricSurface, ContactsOfABallInAGroove) {
   double high = 0.01;
   for (int i = 0; i < 60; ++i) {
     const double z = 0.5 * (low + high);
-    (s.closest(Vec3(x, 0, z), infinity, hint).distance < r ? low : high) = z;
+    (s.view().nearest(Vec3(x, 0, z), infinity).distance < r ? low : high) = z;
   }
-  ContactSet contacts;
-  s.contacts(Vec3(x, 0, low), r + 1e-7, Sides::both, hint, contacts);
-  ASSERT_EQ(contacts.size(), 2U);
-  EXPECT_NEAR(contacts[0].normal.x(), -contacts[1].normal.x(), 1e-3);
-  EXPECT_NEAR(contacts[0].distance, r, 2e-7);
-  EXPECT_NEAR(contacts[1].distance, r, 2e-7);
-  s.contacts(Vec3(x, 0, 0.1), r, Sides::both, hint, contacts);
-  EXPECT_TRUE(contacts.empty());
+  // On either side of the middle the flank there is the nearer one.
+  const Foot left = s.view().nearest(Vec3(x - 1e-7, 0, low), r + 1e-7);
+  const Foot right = s.view().nearest(Vec3(x + 1e-7, 0, low), r + 1e-7);
+  ASSERT_TRUE(left.found());
+  ASSERT_TRUE(right.found());
+  EXPECT_GT(left.normal.x(), 0.1);
+  EXPECT_LT(right.normal.x(), -0.1);
+  EXPECT_NEAR(left.normal.x(), -right.normal.x(), 1e-3);
+  EXPECT_NEAR(left.distance, r, 2e-7);
+  EXPECT_NEAR(right.distance, r, 2e-7);
+  EXPECT_FALSE(s.view().nearest(Vec3(x, 0, 0.1), r).found());
 }
 
 TEST(ParametricSurface, SignedDistanceOfASphere) {
   const ParametricSurface s = surface_of(ParametricShape::sphere);
   Rng rng(19);
-  Hint hint;
   for (int i = 0; i < 500; ++i) {
     const Vec3 p = random_in(rng, s.bounds().grown(0.01));
-    const FieldSample sample = s.eval(p, hint);
+    const FieldSample sample = s.view().eval(p);
     EXPECT_NEAR(sample.value, p.norm() - 0.03, 2e-10);
     if (std::abs(sample.value) < 1e-4) continue;
     EXPECT_LT((sample.gradient - p.normalized()).norm(), 1e-5);

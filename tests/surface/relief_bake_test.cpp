@@ -101,7 +101,7 @@ TEST(ReliefBake, what_wears_it_is_the_formulas_surface) {
   for (int i = 0; i < 3000; ++i) {
     const Vec3 place = random_barycentric(rng);
     const ReliefFrame frame = surface->frame(random_face(rng, baked.mesh));
-    const double off = std::abs(wavy_sphere(surface->point(frame, place.y(), place.z()).position));
+    const double off = std::abs(wavy_sphere(surface->point(frame, place.y(), place.z()).point));
     double& worst = place.minCoeff() > 0.06 ? within : along_edges;
     worst = std::max(worst, off);
   }

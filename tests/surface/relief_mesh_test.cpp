@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "asperity/surface/relief_view.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::relief_mesh_test {
@@ -86,7 +87,7 @@ TEST(Tessellate, every_corner_lies_on_the_relief_over_its_own_face) {
       for_each_piece(n, [&](std::uint32_t piece, const std::array<Vec2, 3>& grid) {
         const auto corners = mesh.corners(static_cast<std::uint32_t>(n * n) * face + piece);
         for (std::size_t k = 0; k < 3; ++k) {
-          const Vec3 smooth = relief->point(frame, grid[k].x(), grid[k].y()).position;
+          const Vec3 smooth = relief->point(frame, grid[k].x(), grid[k].y()).point;
           // Where faces meet they say the same to rounding.
           ASSERT_LT((corners[k] - smooth).norm(), 1e-15) << face << ", " << piece;
         }
@@ -110,7 +111,7 @@ TEST(Tessellate, heights_that_differ_at_an_edge_meet_in_the_middle) {
       for (std::size_t k = 1; k < 3; ++k) {
         if (t[k] == here[0] || t[k] == here[1]) at[static_cast<int>(k) - 1] = 0.5;
       }
-      return relief->point(relief->frame(of), at.x(), at.y()).position;
+      return relief->point(relief->frame(of), at.x(), at.y()).point;
     };
     const Vec3 one = middle_of(face);
     const Vec3 two = middle_of(other);
@@ -125,13 +126,13 @@ TEST(Tessellate, heights_that_differ_at_an_edge_meet_in_the_middle) {
 double facet_error(const ReliefSurface& relief, int n) {
   const TriangleMesh mesh = must(tessellate(relief, n));
   Rng rng(7);
-  Hint hint;
+  SurfaceCache cache;
   double sum = 0.0;
   constexpr int count = 1500;
   for (int i = 0; i < count; ++i) {
     const auto [a, b, c] = mesh.corners(random_face(rng, mesh));
     const Vec3 place = i % 2 == 0 ? Vec3((a + b + c) / 3.0) : Vec3(0.5 * (a + b));
-    sum += relief.closest(place, infinity, hint).distance;
+    sum += relief.view(cache).nearest(place, infinity).distance;
   }
   return sum / count;
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "asperity/surface/relief_view.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::relief_refit_test {
@@ -54,12 +55,13 @@ TEST(ReliefRefit, NearestPointsAreThoseOfTheMovedReliefCutFinely) {
     Fixture fixture(mapping, {}, 1);
     const ReliefSurface relief = fixture.moved_by(waved);
     const test::Tessellation dense = test::dense_net(relief, 12);
-    Hint hint;
+    SurfaceCache cache;
     for (int i = 0; i < 60; ++i) {
       const std::uint32_t face = test::random_face(rng, relief.base().mesh());
       const Vec3 p =
           test::point_on(relief.base().mesh(), face, test::random_barycentric(rng)) + test::random_vector(rng, 0.001);
-      EXPECT_NEAR(relief.closest(p, infinity, hint).distance, dense.index.closest(p, infinity).distance, dense.error);
+      EXPECT_NEAR(relief.view(cache).nearest(p, infinity).distance, dense.index.closest(p, infinity).distance,
+                  dense.error);
     }
   }
 }
@@ -76,12 +78,12 @@ TEST(ReliefRefit, WithTextureCoordinatesItIsTheReliefBuiltOnTheMovedMesh) {
     EXPECT_EQ(moved.reach(), built.reach());
     EXPECT_EQ(moved.report().faces_at_fault, built.report().faces_at_fault);
     EXPECT_EQ(moved.report().overlapping_pairs, built.report().overlapping_pairs);
-    Hint one;
-    Hint other;
+    SurfaceCache one;
+    SurfaceCache other;
     for (int i = 0; i < 30; ++i) {
       const Vec3 p = waved(0.05 * test::random_direction(rng)) + test::random_vector(rng, 0.002);
-      const Foot foot = moved.closest(p, infinity, one);
-      const Foot same = built.closest(p, infinity, other);
+      const Foot foot = moved.view(one).nearest(p, infinity);
+      const Foot same = built.view(other).nearest(p, infinity);
       EXPECT_EQ(foot.point, same.point);
       EXPECT_EQ(foot.normal, same.normal);
     }
@@ -114,12 +116,12 @@ TEST(ReliefRefit, ATurnedReliefIsFeltTurned) {
   Rng rng(4);
   Fixture fixture(Mapping::triplanar);
   const ReliefSurface moved = fixture.moved_by(turned);
-  Hint one;
-  Hint other;
+  SurfaceCache one;
+  SurfaceCache other;
   for (int i = 0; i < 100; ++i) {
     const Vec3 p = 0.05 * test::random_direction(rng) + test::random_vector(rng, 0.001);
-    const Foot before = fixture.rest->closest(p, infinity, one);
-    const Foot after = moved.closest(turned(p), infinity, other);
+    const Foot before = fixture.rest->view(one).nearest(p, infinity);
+    const Foot after = moved.view(other).nearest(turned(p), infinity);
     EXPECT_NEAR(after.distance, before.distance, 1e-8);
     const FieldSample field = fixture.rest->eval(p, one);
     EXPECT_NEAR(moved.eval(turned(p), other).value, field.value, 1e-8);
@@ -172,20 +174,20 @@ TEST(ReliefRefit, OverlapsComeAndGo) {
 
 TEST(ReliefRefit, OlderSnapshotsGoOnAnswering) {
   Fixture fixture(Mapping::triplanar);
-  Hint hint;
+  SurfaceCache cache;
   std::vector<ReliefSurface> held;
   std::vector<double> distance;
   const Vec3 p(0.01, 0.05, 0.02);
   for (int i = 0; i < 5; ++i) {
     held.push_back(fixture.moved_by([&](const Vec3& at) { return Vec3((1.0 + 0.1 * i) * at); }));
-    Hint fresh;
-    distance.push_back(held.back().closest(p, infinity, fresh).distance);
+    SurfaceCache fresh;
+    distance.push_back(held.back().view(fresh).nearest(p, infinity).distance);
   }
-  // One hint for all of them in turn: what it remembers of another is never read.
-  for (std::size_t i = held.size(); i-- > 0;) EXPECT_EQ(held[i].closest(p, infinity, hint).distance, distance[i]);
-  Hint fresh;
-  EXPECT_NEAR(fixture.rest->closest(p, infinity, hint).distance, fixture.rest->closest(p, infinity, fresh).distance,
-              1e-15);
+  // One cache for all of them in turn: what it remembers of another is never read.
+  for (std::size_t i = held.size(); i-- > 0;) EXPECT_EQ(held[i].view(cache).nearest(p, infinity).distance, distance[i]);
+  SurfaceCache fresh;
+  EXPECT_NEAR(fixture.rest->view(cache).nearest(p, infinity).distance,
+              fixture.rest->view(fresh).nearest(p, infinity).distance, 1e-15);
 }
 
 TEST(ReliefRefit, SettingsAreAskedForAgain) {
@@ -233,10 +235,10 @@ TEST(MovedSurface, SignedDistanceFollowsTheVertices) {
   DeformableMesh deformable(*rest);
   const MeshSurface twice =
       must(deformable.moved(moved_positions(rest->mesh(), [](const Vec3& p) { return Vec3(2.0 * p); })));
-  Hint hint;
-  EXPECT_LT(twice.eval(Vec3(0.0, 0.0, 0.09), hint).value, 0.0);
-  EXPECT_GT(rest->eval(Vec3(0.0, 0.0, 0.09), hint).value, 0.0);
-  EXPECT_NEAR(twice.eval(Vec3(0.0, 0.0, 0.12), hint).value, 0.02, 2e-3);
+  SurfaceCache cache;
+  EXPECT_LT(twice.eval(Vec3(0.0, 0.0, 0.09), cache).value, 0.0);
+  EXPECT_GT(rest->eval(Vec3(0.0, 0.0, 0.09), cache).value, 0.0);
+  EXPECT_NEAR(twice.eval(Vec3(0.0, 0.0, 0.12), cache).value, 0.02, 2e-3);
 }
 
 }  // namespace

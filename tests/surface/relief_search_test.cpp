@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <string>
 
+#include "asperity/surface/relief_view.h"
+#include "tests/surface/balls.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::relief_search_test {
@@ -59,24 +61,29 @@ Vec3 random_near(Rng& rng, const TriangleMesh& mesh, double off) {
 TEST(ReliefSearch, the_nearest_point_is_as_near_as_the_dense_meshs_and_on_the_surface) {
   Rng rng(70);
   for (const Searched& one : reliefs()) {
-    Hint warm;
+    SurfaceCache warm;
+    Place last;
     for (int i = 0; i < 400; ++i) {
       const double off = std::pow(10.0, rng.uniform(-6.0, -2.0));
       const Vec3 p = random_near(rng, one.dense.index.mesh(), off);
       const double expected = one.dense.index.closest(p, infinity).distance;
-      Hint cold;
-      const Foot foot = one.surface->closest(p, infinity, i % 2 == 0 ? warm : cold);
+      SurfaceCache cold;
+      const Foot foot = i % 2 == 0 ? one.surface->view(warm).nearest(p, infinity, last)
+                                   : one.surface->view(cold).nearest(p, infinity);
       ASSERT_TRUE(foot.found());
+      last = {foot.element, false, foot.at};
       ASSERT_NEAR(foot.distance, expected, one.dense.error + 1e-3 * expected)
           << one.name << ", case " << i << " at " << p.transpose();
       ASSERT_NEAR((p - foot.point).norm(), foot.distance, 1e-12);
       const ReliefFrame frame = one.surface->frame(foot.element);
-      const ReliefPoint there = one.surface->point(frame, foot.barycentric[1], foot.barycentric[2]);
-      ASSERT_LT((there.position - foot.point).norm(), 1e-12) << one.name << ": it lies on the surface";
+      const ReliefPoint there = one.surface->point(frame, foot.at[1], foot.at[2]);
+      ASSERT_LT((there.point - foot.point).norm(), 1e-12) << one.name << ": it lies on the surface";
       ASSERT_GE(foot.normal.dot(p - foot.point), 0.0) << one.name;
-      // A bound below the distance finds nothing, one above it the same.
-      ASSERT_FALSE(one.surface->closest(p, 0.9 * foot.distance - one.dense.error, cold).found()) << one.name;
-      const Foot bounded = one.surface->closest(p, 1.1 * foot.distance + 1e-9, cold);
+      // A bound below the distance finds nothing, one above it the same; from there, and from nowhere.
+      const ReliefView view = one.surface->view(cold);
+      const Place start = i % 2 == 0 ? Place{} : last;
+      ASSERT_FALSE(view.nearest(p, 0.9 * foot.distance - one.dense.error, start).found()) << one.name;
+      const Foot bounded = view.nearest(p, 1.1 * foot.distance + 1e-9, start);
       ASSERT_TRUE(bounded.found()) << one.name << ", case " << i;
       ASSERT_NEAR(bounded.distance, foot.distance, one.dense.error + 1e-3 * expected) << one.name << ", case " << i;
     }
@@ -86,7 +93,7 @@ TEST(ReliefSearch, the_nearest_point_is_as_near_as_the_dense_meshs_and_on_the_su
 TEST(ReliefSearch, a_segment_meets_the_surface_where_the_dense_mesh_is_met) {
   Rng rng(71);
   for (const Searched& one : reliefs()) {
-    Hint hint;
+    SurfaceCache cache;
     int met = 0;
     int apart = 0;
     for (int i = 0; i < 3000; ++i) {
@@ -94,7 +101,7 @@ TEST(ReliefSearch, a_segment_meets_the_surface_where_the_dense_mesh_is_met) {
       const Vec3 from = random_near(rng, one.dense.index.mesh(), 0.7 * length);
       const Segment motion{from, from + length * random_direction(rng)};
       const FirstHit oracle = one.dense.index.first_hit(motion);
-      const SweptHit hit = one.surface->segment(motion, 0.0, Sides::both, hint);
+      const SweptHit hit = one.surface->view(cache).first_touch(motion, Sides::both);
       if (hit.hit) {
         const Vec3 touched = motion.from + hit.t * (motion.to - motion.from);
         ASSERT_LT((touched - hit.contact.point).norm(), one.surface->skin()) << one.name << ", segment " << i;
@@ -118,7 +125,7 @@ TEST(ReliefSearch, a_segment_that_clearly_crosses_a_closed_relief_is_never_misse
   Rng rng(72);
   for (const Searched& one : reliefs()) {
     if (!one.dense.index.mesh().report().closed()) continue;
-    Hint hint;
+    SurfaceCache cache;
     const Box box = one.surface->bounds().grown(0.01);
     int crossing = 0;
     for (int i = 0; i < 3000; ++i) {
@@ -128,24 +135,24 @@ TEST(ReliefSearch, a_segment_that_clearly_crosses_a_closed_relief_is_never_misse
       const bool out = depth_inside(one.dense.index, to) < -2.0 * one.dense.error;
       if (!in || !out) continue;
       ++crossing;
-      ASSERT_TRUE(one.surface->segment({from, to}, 0.0, Sides::both, hint).hit) << one.name << ", outwards, " << i;
-      ASSERT_TRUE(one.surface->segment({to, from}, 0.0, Sides::both, hint).hit) << one.name << ", inwards, " << i;
-      ASSERT_TRUE(one.surface->segment({to, from}, 0.0, Sides::front, hint).hit) << one.name << ", front, " << i;
+      ASSERT_TRUE(one.surface->view(cache).first_touch({from, to}, Sides::both).hit) << one.name << ", outwards, " << i;
+      ASSERT_TRUE(one.surface->view(cache).first_touch({to, from}, Sides::both).hit) << one.name << ", inwards, " << i;
+      ASSERT_TRUE(one.surface->view(cache).first_touch({to, from}, Sides::front).hit) << one.name << ", front, " << i;
     }
     EXPECT_GT(crossing, 5) << one.name;
   }
 }
 
-TEST(ReliefSearch, hints_change_no_answer) {
+TEST(ReliefSearch, caches_change_no_answer) {
   Rng rng(73);
   for (const Searched& one : reliefs()) {
-    Hint warm;
+    SurfaceCache warm;
     for (int i = 0; i < 300; ++i) {
       const Vec3 from = random_near(rng, one.dense.index.mesh(), 2e-3);
       const Segment motion{from, from + 5e-3 * random_direction(rng)};
-      Hint cold;
-      const SweptHit one_hit = one.surface->segment(motion, 0.0, Sides::both, warm);
-      const SweptHit other = one.surface->segment(motion, 0.0, Sides::both, cold);
+      SurfaceCache cold;
+      const SweptHit one_hit = one.surface->view(warm).first_touch(motion, Sides::both);
+      const SweptHit other = one.surface->view(cold).first_touch(motion, Sides::both);
       ASSERT_EQ(one_hit.hit, other.hit) << one.name;
       ASSERT_EQ(one_hit.t, other.t) << one.name;
       ASSERT_EQ(one_hit.contact.element, other.contact.element) << one.name;
@@ -156,23 +163,24 @@ TEST(ReliefSearch, hints_change_no_answer) {
 TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {
   Rng rng(74);
   for (const Searched& one : reliefs()) {
-    Hint hint;
+    SurfaceCache cache;
     int stopped = 0;
     for (int i = 0; i < 60; ++i) {
       const double radius = rng.uniform(2e-4, 2e-3);
       const Vec3 from = random_near(rng, one.dense.index.mesh(), 8e-3);
       if (one.dense.index.closest(from, infinity).distance < radius + 2.0 * one.dense.error) continue;
       const Segment motion{from, from + 5e-3 * random_direction(rng)};
-      const SweptHit hit = one.surface->segment(motion, radius, Sides::both, hint);
-      const double end = hit.hit ? hit.t : 1.0;
+      const double touch =
+          ball_touch(motion, radius, [&](const Vec3& p) { return one.surface->view(cache).nearest(p, infinity); });
+      const double end = std::min(touch, 1.0);
       for (int k = 0; k <= 50; ++k) {
         const Vec3 at = motion.from + (end * k / 50.0) * (motion.to - motion.from);
         ASSERT_GT(one.dense.index.closest(at, infinity).distance, 0.9 * radius - one.dense.error)
             << one.name << ", case " << i;
       }
-      if (!hit.hit) continue;
+      if (touch > 1.0) continue;
       ++stopped;
-      const Vec3 at = motion.from + hit.t * (motion.to - motion.from);
+      const Vec3 at = motion.from + touch * (motion.to - motion.from);
       ASSERT_NEAR(one.dense.index.closest(at, infinity).distance, radius, 0.02 * radius + one.dense.error)
           << one.name << ", case " << i;
     }

@@ -1,7 +1,8 @@
-#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/relief_view.h"
 
 #include <gtest/gtest.h>
 
+#include "tests/surface/balls.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::relief_surface_test {
@@ -24,7 +25,7 @@ TEST(ReliefSegment, agrees_with_a_dense_displaced_mesh) {
   const TriangleIndex dense = dense_plane(map, 256);
   const double texel = relief->coat().texel_size();
   Rng rng(31);
-  Hint hint;
+  SurfaceCache cache;
   int hits = 0;
   for (int i = 0; i < 3000; ++i) {
     const double reach = 0.45 * side;
@@ -32,7 +33,7 @@ TEST(ReliefSegment, agrees_with_a_dense_displaced_mesh) {
     const Vec3 to(rng.uniform(-reach, reach), rng.uniform(-reach, reach), rng.uniform(-0.004, -0.0015));
     const Segment motion = i % 2 == 0 ? Segment{from, to} : Segment{to, from};
     const FirstHit oracle = dense.first_hit(motion);
-    const SweptHit hit = relief->segment(motion, 0.0, Sides::both, hint);
+    const SweptHit hit = relief->view(cache).first_touch(motion, Sides::both);
     ASSERT_NE(oracle.face, no_index);
     ASSERT_TRUE(hit.hit) << i;
     const double length = (motion.to - motion.from).norm();
@@ -40,29 +41,29 @@ TEST(ReliefSegment, agrees_with_a_dense_displaced_mesh) {
     hits += std::abs(hit.t - oracle.t) * length < 0.02 * texel ? 1 : 0;
     ASSERT_NEAR(hit.t * length, oracle.t * length, length) << i;
     const Vec3 touch = motion.from + hit.t * (motion.to - motion.from);
-    ASSERT_LT(std::abs(relief->eval(touch, hint).value), 1e-5 * texel);
+    ASSERT_LT(std::abs(relief->eval(touch, cache).value), 1e-5 * texel);
   }
   EXPECT_GE(hits, 2990);
 }
 
 TEST(ReliefSegment, nothing_is_met_above_the_highest_point) {
   const auto relief = coated(plane_grid(side, side, 4, 4), wavy_map(1e-3, 32), Mapping::uv);
-  Hint hint;
-  EXPECT_FALSE(relief->segment({Vec3(-0.01, 0.0, 0.0011), Vec3(0.01, 0.005, 0.0012)}, 0.0, Sides::both, hint).hit);
-  EXPECT_FALSE(relief->segment({Vec3(0.0, 0.0, 0.002), Vec3(0.0, 0.0, 0.002)}, 0.0, Sides::both, hint).hit);
+  SurfaceCache cache;
+  EXPECT_FALSE(relief->view(cache).first_touch({Vec3(-0.01, 0.0, 0.0011), Vec3(0.01, 0.005, 0.0012)}, Sides::both).hit);
+  EXPECT_FALSE(relief->view(cache).first_touch({Vec3(0.0, 0.0, 0.002), Vec3(0.0, 0.0, 0.002)}, Sides::both).hit);
 }
 
 TEST(ReliefSegment, front_alone_is_touched_from_outside_only) {
   const auto relief = coated(plane_grid(side, side, 4, 4), flat_map(0.5e-3), Mapping::uv);
-  Hint hint;
+  SurfaceCache cache;
   const Segment down{Vec3(0.001, 0.002, 0.002), Vec3(0.001, 0.002, -0.002)};
   const Segment up{down.to, down.from};
-  const SweptHit entered = relief->segment(down, 0.0, Sides::front, hint);
+  const SweptHit entered = relief->view(cache).first_touch(down, Sides::front);
   ASSERT_TRUE(entered.hit);
   EXPECT_NEAR(entered.t, 1.5 / 4.0, 5e-6);
   EXPECT_LT((entered.contact.normal - Vec3::UnitZ()).norm(), 1e-9);
-  EXPECT_FALSE(relief->segment(up, 0.0, Sides::front, hint).hit);
-  const SweptHit left = relief->segment(up, 0.0, Sides::both, hint);
+  EXPECT_FALSE(relief->view(cache).first_touch(up, Sides::front).hit);
+  const SweptHit left = relief->view(cache).first_touch(up, Sides::both);
   ASSERT_TRUE(left.hit);
   EXPECT_NEAR(left.t, 2.5 / 4.0, 5e-6);
   EXPECT_LT((left.contact.normal + Vec3::UnitZ()).norm(), 1e-9)
@@ -71,21 +72,22 @@ TEST(ReliefSegment, front_alone_is_touched_from_outside_only) {
 
 TEST(ReliefSegment, a_ball_stops_one_radius_above_a_flat_coat) {
   const auto relief = coated(plane_grid(side, side, 4, 4), flat_map(0.5e-3), Mapping::uv);
-  Hint hint;
-  const SweptHit hit = relief->segment({Vec3(0.001, 0.002, 0.004), Vec3(0.001, 0.002, 0.0)}, 1e-3, Sides::both, hint);
-  ASSERT_TRUE(hit.hit);
-  EXPECT_NEAR(4e-3 * (1.0 - hit.t), 1.5e-3, 1e-8);
+  SurfaceCache cache;
+  const double t = ball_touch({Vec3(0.001, 0.002, 0.004), Vec3(0.001, 0.002, 0.0)}, 1e-3,
+                              [&](const Vec3& p) { return relief->view(cache).nearest(p, infinity); });
+  ASSERT_LE(t, 1.0);
+  EXPECT_NEAR(4e-3 * (1.0 - t), 1.5e-3, 1e-8);
 }
 
 /// Value and gradient against central differences at points whose foot stays inside one face.
 void expect_gradient(const ReliefSurface& relief, const Vec3& p, int& checked) {
-  Hint hint;
+  SurfaceCache cache;
   const double h = 1e-7;
-  const FieldSample here = relief.eval(p, hint);
+  const FieldSample here = relief.eval(p, cache);
   Vec3 expected;
   for (int k = 0; k < 3; ++k) {
-    const FieldSample ahead = relief.eval(p + h * Vec3::Unit(k), hint);
-    const FieldSample behind = relief.eval(p - h * Vec3::Unit(k), hint);
+    const FieldSample ahead = relief.eval(p + h * Vec3::Unit(k), cache);
+    const FieldSample behind = relief.eval(p - h * Vec3::Unit(k), cache);
     if (ahead.element != here.element || behind.element != here.element) return;
     expected[k] = (ahead.value - behind.value) / (2.0 * h);
   }
@@ -113,11 +115,11 @@ TEST(ReliefEval, value_is_the_height_over_the_relief_on_a_plane) {
   const HeightMap map = wavy_map(1e-3);
   const auto relief = coated(plane_grid(side, side, 4, 4), map, Mapping::uv);
   Rng rng(9);
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 p = random_vector(rng, 0.4 * side);
     const double height = map.sample(Vec2(p.x() / side + 0.5, p.y() / side + 0.5)).height;
-    const FieldSample sample = relief->eval(p, hint);
+    const FieldSample sample = relief->eval(p, cache);
     ASSERT_NEAR(sample.value, p.z() - height, 1e-9);
     ASSERT_NEAR(sample.height, height, 1e-9);
   }
@@ -126,15 +128,15 @@ TEST(ReliefEval, value_is_the_height_over_the_relief_on_a_plane) {
 TEST(ReliefEval, a_coat_of_height_zero_is_the_base) {
   const auto relief = coated(random_closed_mesh(3, 2, 0.02, 0.4), flat_map(0.0), Mapping::triplanar);
   Rng rng(10);
-  Hint one;
-  Hint other;
+  SurfaceCache one;
+  SurfaceCache other;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 p = random_vector(rng, 0.03);
     const FieldSample a = relief->eval(p, one);
     const FieldSample b = relief->base().eval(p, other);
     // Shell heights are not distances; inside and outside, and where the surface is, they agree.
     ASSERT_EQ(a.value > 0.0, b.value > 0.0);
-    const Foot foot = relief->closest(p, infinity, one);
+    const Foot foot = relief->view(one).nearest(p, infinity);
     ASSERT_NEAR(foot.distance, std::abs(b.value), 1e-9);
   }
 }
@@ -143,35 +145,32 @@ TEST(ReliefClosest, agrees_with_eval_near_the_surface) {
   const auto relief = coated(icosphere(2, 0.02), wavy_map(5e-4), Mapping::triplanar);
   const TriangleMesh& mesh = relief->base().mesh();
   Rng rng(4);
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 1000; ++i) {
     const std::uint32_t face = random_face(rng, mesh);
     const Vec3 barycentric = random_barycentric(rng, 0.1);
     const double height = relief->coat().sample(mesh, face, barycentric).height;
     const double off = rng.uniform(-1e-6, 1e-6);
     const Vec3 p = point_on(mesh, face, barycentric) + (height + off) * mesh.face_normal(face);
-    const FieldSample sample = relief->eval(p, hint);
-    const Foot foot = relief->closest(p, infinity, hint);
+    const FieldSample sample = relief->eval(p, cache);
+    const Foot foot = relief->view(cache).nearest(p, infinity);
     ASSERT_TRUE(foot.found());
     ASSERT_NEAR(foot.distance, std::abs(sample.value) / sample.gradient.norm(), 0.01 * std::abs(off) + 1e-9);
     ASSERT_NEAR((p - foot.point).norm(), foot.distance, 1e-15);
     ASSERT_NEAR(foot.normal.norm(), 1.0, 1e-12);
     // First order: what is left is of the order of the distance squared over a texel.
-    ASSERT_LT(std::abs(relief->eval(foot.point, hint).value), 0.01 * std::abs(off) + 1e-15);
-    ASSERT_FALSE(relief->closest(p, 0.5 * foot.distance, hint).found());
+    ASSERT_LT(std::abs(relief->eval(foot.point, cache).value), 0.01 * std::abs(off) + 1e-15);
+    ASSERT_FALSE(relief->view(cache).nearest(p, 0.5 * foot.distance).found());
   }
 }
 
-TEST(ReliefContacts, answer_the_plane_within_reach_and_nothing_beyond) {
+TEST(ReliefClosest, a_ball_has_the_plane_within_its_reach_and_nothing_beyond) {
   const auto relief = coated(plane_grid(side, side, 4, 4), flat_map(0.5e-3), Mapping::uv);
-  Hint hint;
-  ContactSet near;
-  relief->contacts(Vec3(0.001, 0.002, 0.0014), 1e-3, Sides::both, hint, near);
-  ASSERT_EQ(near.size(), 1U);
-  EXPECT_NEAR(near[0].point.z(), 0.5e-3, 1e-9);
-  ContactSet far;
-  relief->contacts(Vec3(0.001, 0.002, 0.0016), 1e-3, Sides::both, hint, far);
-  EXPECT_TRUE(far.empty());
+  SurfaceCache cache;
+  const Foot near = relief->view(cache).nearest(Vec3(0.001, 0.002, 0.0014), 1e-3);
+  ASSERT_TRUE(near.found());
+  EXPECT_NEAR(near.point.z(), 0.5e-3, 1e-9);
+  EXPECT_FALSE(relief->view(cache).nearest(Vec3(0.001, 0.002, 0.0016), 1e-3).found());
 }
 
 TEST(ReliefSurfaceTest, bounds_hold_the_relief) {
@@ -205,12 +204,12 @@ TEST(MakeRelief, is_the_relief_of_a_coat_on_that_very_mesh) {
   Rng rng(8);
   for (int i = 0; i < 300; ++i) {
     const Vec3 p = rng.uniform(0.019, 0.022) * random_direction(rng);
-    Hint a;
-    Hint b;
-    Hint c;
-    const Foot foot = by_hand->closest(p, infinity, a);
-    EXPECT_EQ(made->closest(p, infinity, b).point, foot.point);
-    EXPECT_EQ(from_parts->closest(p, infinity, c).point, foot.point);
+    SurfaceCache a;
+    SurfaceCache b;
+    SurfaceCache c;
+    const Foot foot = by_hand->view(a).nearest(p, infinity);
+    EXPECT_EQ(made->view(b).nearest(p, infinity).point, foot.point);
+    EXPECT_EQ(from_parts->view(c).nearest(p, infinity).point, foot.point);
   }
 }
 

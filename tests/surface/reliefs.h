@@ -77,7 +77,7 @@ inline Tessellation dense_net(const ReliefSurface& surface, int n) {
   for (std::uint32_t face = 0; face < faces; ++face) {
     const ReliefFrame frame = surface.frame(face);
     const TriangleMesh::Triangle& t = base.triangles()[face];
-    const auto at = [&](double i, double j) { return surface.point(frame, i / n, j / n).position; };
+    const auto at = [&](double i, double j) { return surface.point(frame, i / n, j / n).point; };
     std::vector<std::uint32_t> numbers;
     const auto number = [&](int i, int j) -> std::uint32_t {
       const auto next = static_cast<std::uint32_t>(source.positions.size());
@@ -135,15 +135,15 @@ inline double depth_inside(const TriangleIndex& index, const Vec3& p) {
   // At an edge or vertex the angle-weighted normal of all faces there decides.
   Vec3 normal = Vec3::Zero();
   int zeros = 0;
-  for (int k = 0; k < 3; ++k) zeros += foot.barycentric[k] < 1e-9 ? 1 : 0;
+  for (int k = 0; k < 3; ++k) zeros += foot.at[k] < 1e-9 ? 1 : 0;
   if (zeros == 0) {
     normal = mesh.face_normal(foot.element);
   } else {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = mesh.triangles()[foot.element][static_cast<std::size_t>(k)];
-      if (zeros == 2 && foot.barycentric[k] > 0.5) normal = mesh.vertex_normal(vertex);
+      if (zeros == 2 && foot.at[k] > 0.5) normal = mesh.vertex_normal(vertex);
       const std::uint32_t across = mesh.neighbour(foot.element, (k + 1) % 3);
-      if (zeros == 1 && foot.barycentric[k] < 1e-9 && across != no_index)
+      if (zeros == 1 && foot.at[k] < 1e-9 && across != no_index)
         normal = mesh.face_normal(foot.element) + mesh.face_normal(across);
     }
   }

@@ -176,7 +176,7 @@ RC_GTEST_PROP(T6_injectivity, every_point_in_the_shell_is_owned_once_and_locate_
   const double amplitude = mesh.mean_edge() * rng.uniform(0.01, 0.15);
   const auto surface = relief_on(std::move(mesh), {tiled(wavy_map(amplitude), 0.01)},
                                  CoatSettings{Mapping::triplanar, Vec2::Ones(), {}});
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 40; ++i) {
     const std::uint32_t face = random_face(rng, surface->base().mesh());
     const ReliefFrame frame = surface->frame(face);
@@ -196,7 +196,7 @@ RC_GTEST_PROP(T6_injectivity, every_point_in_the_shell_is_owned_once_and_locate_
     RC_ASSERT(!owners.empty());
     ReliefFrame found;
     ShellPlace at;
-    RC_ASSERT(surface->locate(p, hint, found, at));
+    RC_ASSERT(surface->locate(p, cache, {}, found, at));
     if (distant) continue;
     RC_ASSERT(found.face == face);
     RC_ASSERT(difference(frame.prism, place, at, surface->base().mesh().mean_edge()) < 1e-9);
@@ -211,14 +211,14 @@ RC_GTEST_PROP(T6_injectivity, what_locate_finds_is_an_owner_wherever_a_brute_for
   const auto surface = relief_on(std::move(mesh), {tiled(wavy_map(amplitude), 0.01)},
                                  CoatSettings{Mapping::triplanar, Vec2::Ones(), {}});
   const Box box = surface->bounds();
-  Hint hint;
+  SurfaceCache cache;
   for (int i = 0; i < 60; ++i) {
     const Vec3 p = box.lower + Vec3(rng.uniform(), rng.uniform(), rng.uniform()).cwiseProduct(box.extent());
     const std::vector<Owner> owners = owners_by_brute_force(*surface, p, -1e-6);
     if (owners.empty()) continue;
     ReliefFrame found;
     ShellPlace at;
-    RC_ASSERT(surface->locate(p, hint, found, at));
+    RC_ASSERT(surface->locate(p, cache, {}, found, at));
     bool owns = false;
     for (const Owner& owner : owners) owns = owns || owner.face == found.face;
     RC_ASSERT(owns);

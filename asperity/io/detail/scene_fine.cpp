@@ -10,6 +10,7 @@
 
 #include "asperity/io/detail/scene_heights.h"
 #include "asperity/io/texture_waves.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity {
 namespace {

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "asperity/core/parallel_for.h"
-#include "asperity/render/fine_contact.h"
+#include "asperity/render/fine/texture.h"
 
 namespace asperity {
 namespace {
@@ -41,67 +41,50 @@ Interval clip(const Vec3& origin, const Vec3& direction, const Box& box) {
   return inside;
 }
 
-/// First touch of a mesh, an isosurface, a parametric or a custom surface by the ray's parameter, from the sides that
-/// can be touched.
-template <class S>
-Pixel first_touch(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides, Hint& hint) {
+/// First touch of a surface by the ray's parameter, from the sides that can be touched.
+template <class View>
+Pixel first_touch(const View& view, const Vec3& origin, const Vec3& direction, Interval part, Sides sides) {
   const Segment motion{origin + part.from * direction, origin + part.to * direction};
-  const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
+  const SweptHit hit = view.first_touch(motion, sides);
   if (!hit.hit) return {};
-  return {part.from + hit.t * (part.to - part.from), hit.contact.normal, hit.contact.element};
-}
-
-Pixel first_hit(const MeshSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
-  return first_touch(surface, origin, direction, part, sides, hint);
-}
-
-Pixel first_hit(const IsoSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
-  return first_touch(surface, origin, direction, part, sides, hint);
-}
-
-Pixel first_hit(const ParametricSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
-  return first_touch(surface, origin, direction, part, sides, hint);
-}
-
-Pixel first_hit(const CustomSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
-  return first_touch(surface, origin, direction, part, sides, hint);
+  Pixel pixel{part.from + hit.t * (part.to - part.from), hit.contact.normal};
+  pixel.place = {hit.contact.element, hit.side < 0.0, hit.contact.at};
+  return pixel;
 }
 
 /// The mesh that an implicit surface was made from is there to be seen; where what is felt differs, that is shown.
 Pixel first_hit(const ImplicitSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
+                SurfaceCache& cache) {
   if (surface.is_mesh())
-    return first_hit(*surface.mesh(), origin, direction, part, surface.mesh()->natural_sides(), hint);
-  return first_hit(surface.iso(), origin, direction, part, sides, hint);
+    return first_touch(surface.mesh()->view(cache), origin, direction, part, surface.mesh()->natural_sides());
+  return first_touch(surface.view(cache), origin, direction, part, sides);
 }
 
-/// Whether a point over an open mesh lies beside its rim: the implicit relief goes on there, what is felt does not.
-bool beside_rim(const ReliefSurface& surface, const Vec3& point, Hint& hint) {
-  const Foot foot = surface.base().closest(point, infinity, hint);
-  if (!foot.found()) return true;
-  return asperity::beyond_rim(surface.base().mesh(), foot, point, surface.skin());
-}
-
-/// First hit of a relief. Its own query crosses the empty space above all heights in steps as long as that space is
-/// wide.
+/// First hit of a relief. Beside the rim of an open mesh the implicit relief goes on; what is felt does not.
 Pixel first_hit(const ReliefSurface& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
-                Hint& hint) {
-  const bool open = !surface.base().mesh().report().closed();
+                SurfaceCache& cache) {
+  const ReliefView view = surface.view(cache);
+  const TriangleMesh& base = surface.base().mesh();
   const double after = surface.skin() / direction.norm();
   for (int i = 0; i < most_rim_hits && part.from < part.to; ++i) {
-    const Segment motion{origin + part.from * direction, origin + part.to * direction};
-    const SweptHit hit = surface.segment(motion, 0.0, sides, hint);
-    if (!hit.hit) return {};
-    const double t = part.from + hit.t * (part.to - part.from);
-    if (!open || !beside_rim(surface, origin + t * direction, hint))
-      return {t, hit.contact.normal, hit.contact.element};
-    part.from = t + 10.0 * after;
+    const Pixel pixel = first_touch(view, origin, direction, part, sides);
+    if (!pixel.hit() || base.report().closed()) return pixel;
+    const Vec3 point = origin + pixel.depth * direction;
+    const Foot foot = view.nearest_base(point);
+    if (foot.found() && !beyond_rim(base, foot, point, surface.skin())) return pixel;
+    part.from = pixel.depth + 10.0 * after;
   }
   return {};
+}
+
+template <class S>
+Pixel first_hit(const S& surface, const Vec3& origin, const Vec3& direction, Interval part, Sides sides,
+                SurfaceCache& cache) {
+  if constexpr (requires { surface.view(); }) {
+    return first_touch(surface.view(), origin, direction, part, sides);
+  } else {
+    return first_touch(surface.view(cache), origin, direction, part, sides);
+  }
 }
 
 /// Calls work(row, caster) for every row, shared out over threads, each with a caster of its own.
@@ -239,23 +222,21 @@ Pixel RayCaster::cast(double x, double y) {
     part.to = std::min(part.to, nearest.depth);
     if (part.from >= part.to) continue;
     const Pixel seen = std::visit(
-        [&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, hints_[i]); }, instance.surface);
+        [&](const auto& s) { return first_hit(*s, from, along, part, instance.sides, caches_[i]); }, instance.surface);
     if (!seen.hit() || seen.depth >= nearest.depth) continue;
     nearest = seen;
     Vec3 normal = seen.normal.dot(along) > 0.0 ? Vec3(-seen.normal) : seen.normal;
     if (instance.fine != nullptr) {
       // What is felt as a texture is seen as one.
       const double footprint = camera_->pixel * seen.depth;
-      normal -= texture_at(instance, seen.element, from + seen.depth * along, normal, hints_[i], footprint).gradient;
+      normal -= texture_at(instance, seen.place, from + seen.depth * along, normal, footprint).gradient;
       normal.normalize();
     }
     nearest.normal = instance.world_from_object.rotate(normal);
     nearest.filled = 0.0;
     if (instance.closed_from != nullptr) {
       const ClosedRelief& closed = instance.closed_from->closed;
-      const ReliefPlace& place = hints_[i].relief;
-      const Vec3 barycentric(1.0 - place.u - place.v, place.u, place.v);
-      nearest.filled = closed.rise_at(place.frame.face, barycentric) > closed.report.tolerance ? 1.0 : 0.0;
+      nearest.filled = closed.rise_at(seen.place.element, seen.place.at) > closed.report.tolerance ? 1.0 : 0.0;
     }
   }
   return nearest;

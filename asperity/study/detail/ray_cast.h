@@ -13,25 +13,25 @@ namespace asperity {
 
 /// What one ray saw.
 struct Pixel {
-  double depth = infinity;           ///< along the camera's forward axis (m); infinity: nothing
-  Vec3 normal = Vec3::Zero();        ///< unit, towards the eye; bent by a texture
-  std::uint32_t element = no_index;  ///< face, where the surface has faces
-  double filled = 0.0;               ///< 1 where closing has raised the relief
+  double depth = infinity;     ///< along the camera's forward axis (m); infinity: nothing
+  Vec3 normal = Vec3::Zero();  ///< unit, towards the eye; bent by a texture
+  Place place = {};            ///< as the surface names it
+  double filled = 0.0;         ///< 1 where closing has raised the relief
   [[nodiscard]] bool hit() const { return depth < infinity; }
 };
 
-/// Casts rays through the surfaces' own segment queries. One per thread: it keeps their hints. [main]
+/// Casts rays through the surfaces' own queries. One per thread: it keeps their caches. [main]
 class RayCaster {
  public:
   RayCaster(const Scene& scene, const Camera& camera)
-      : scene_(&scene), camera_(&camera), hints_(std::make_unique<Hint[]>(scene.instances().size())) {}
+      : scene_(&scene), camera_(&camera), caches_(std::make_unique<SurfaceCache[]>(scene.instances().size())) {}
   /// The nearest surface through image place (x, y).
   [[nodiscard]] Pixel cast(double x, double y);
 
  private:
   const Scene* scene_;
   const Camera* camera_;
-  std::unique_ptr<Hint[]> hints_;
+  std::unique_ptr<SurfaceCache[]> caches_;
 };
 
 /// One pixel a place of the image, row by row.

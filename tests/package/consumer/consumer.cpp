@@ -19,11 +19,12 @@ Result<double> force_on_box(const char* file) {
   box.material.stiffness = 1000.0;
   ASPERITY_TRY(const Scene scene, Scene::build({box}));
   ProxyState state;
+  ProxyCache cache;
   ProbeSample probe;
   probe.pose.position = Vec3(0.01, 0.02, 0.06);
-  step(scene, state, probe, Seconds(1e-3));
+  step(scene, state, cache, probe, Seconds(1e-3));
   probe.pose.position.z() = 0.049;
-  return step(scene, state, probe, Seconds(1e-3)).wrench.force.z();
+  return step(scene, state, cache, probe, Seconds(1e-3)).wrench.force.z();
 }
 
 }  // namespace

@@ -1,0 +1,365 @@
+#include "asperity/render/contact/joint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace asperity {
+
+namespace {
+
+constexpr int most_attempts = 4;
+// Between two walls a ball is pushed from one to the other, each time by less.
+constexpr int most_pushes = 12;
+// On a relief a move of this share of its finest grain is not worth making; on triangles near the corner of a valley
+// single moves can be a fraction of the skin long and still lead out of it.
+constexpr double rest_of_grain = 2e-3;
+constexpr double rest_of_skin = 1e-3;
+constexpr double rest_of_skin_beside_smooth = 0.05;
+// A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
+constexpr double point_of_grain = 1e-3;
+
+}  // namespace
+
+void JointSolve::add(Touched& touch) noexcept {
+  Entry entry;
+  entry.touch = &touch;
+  entry.smooth = touch.facts->smooth;
+  entry.near = touch.contact->first();
+  if (const auto* law = std::get_if<GeneratedGeometryLaw>(&touch.instance->law)) {
+    // As many patches as contacts: never full.
+    entry.patch = patches_->emplace_back();
+    entry.patch->start(*relief_of(*touch.instance), *law);
+    entry.skin = entry.patch->skin();
+  } else {
+    entry.skin = on_view(touch.view, [](const auto& view) { return view.skin(); });
+  }
+  on_smooth_view(touch.view, [&](const auto& view) {
+    if (!entry.smooth) return;
+    entry.grain = view.grain();
+    entry.direct = view.direction_from();
+    entry.folds = view.has_folds();
+  });
+  entries_.push_back(entry);
+  if (!entry.smooth) return;
+  smooth_ = true;
+  margin_ = std::max({margin_, point_of_grain * entry.grain, 4.0 * entry.skin});
+  // What is thinner than a real ball must not slip past it; what is thinner than a blown-up point is below its skin.
+  if (radius_ > 0.25 * entry.grain) longest_step_ = std::min(longest_step_, 0.5 * radius_);
+}
+
+bool JointSolve::complete() const noexcept {
+  bool all = true;
+  for (const Entry& entry : entries_) all = all && (entry.patch == nullptr || entry.patch->complete());
+  return all;
+}
+
+bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept {
+  Entry& entry = entries_[index];
+  const Touched& touch = *entry.touch;
+  const Vec3 local = touch.pose->apply_inverse(position);
+  // How far beyond touching a tangent plane is worth knowing.
+  const double reach = radius_ + gap(entry) + (entry.folds ? 2.0 * entry.skin : 0.05 * entry.grain);
+  bool from_behind = false;
+  const Foot foot = on_smooth_view(touch.view, [&](const auto& view) {
+    const Foot found = view.nearest(local, reach, entry.near);
+    if (!found.found()) return found;
+    entry.near = {found.element, false, found.at};
+    const Vec3 front = view.front(found);
+    const Vec3 way = found.distance > entry.direct ? Vec3((local - found.point) / found.distance) : found.normal;
+    from_behind = way.dot(front) < 0.0;
+    entry.near.back = from_behind;
+    return found;
+  });
+  if (!foot.found() || (from_behind && touch.instance->sides == Sides::front)) return false;
+  // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
+  // reached has no direction of its own, the surface's is taken.
+  Vec3 normal = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
+  normal = touch.pose->rotate(normal);
+  const Vec3 point = touch.pose->apply(foot.point);
+  plane = {normal, normal.dot(point) + radius_, gap(entry), static_cast<std::uint32_t>(index), foot};
+  return true;
+}
+
+void JointSolve::remember(const ConstraintPlane& plane) noexcept {
+  // One plane a direction: the newest.
+  constexpr double same_direction = 0.999;
+  for (std::size_t i = feet_.size(); i-- > 0;) {
+    if (feet_[i].owner == plane.owner && feet_[i].normal.dot(plane.normal) > same_direction) feet_.swap_remove(i);
+  }
+  if (feet_.size() == feet_.capacity()) feet_.swap_remove(0);
+  feet_.push_back(plane);
+}
+
+void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    if (entry.smooth) {
+      ConstraintPlane plane;
+      if (!foot_plane(i, position, plane)) continue;
+      remember(plane);
+      // Near a surface without folds its tangent plane holds before it is touched.
+      if (!entry.folds) out.push_back(plane);
+      continue;
+    }
+    const Touched& touch = *entry.touch;
+    const Vec3 local = touch.to_local(position);
+    ContactSet contacts;
+    if (entry.patch != nullptr) {
+      entry.patch->contacts(local, radius_ + margin_, touch.instance->sides, contacts);
+    } else {
+      std::get_if<TriangleView>(&touch.view)->contacts(local, radius_ + margin_, touch.instance->sides, contacts);
+    }
+    for (const Foot& contact : contacts) {
+      const Vec3 normal = touch.turned(contact.normal);
+      out.push_back({normal, normal.dot(touch.to_world(contact.point)) + radius_, gap(entry),
+                     static_cast<std::uint32_t>(i), contact});
+    }
+  }
+  for (std::size_t i = feet_.size(); i-- > 0;) {
+    const ConstraintPlane& plane = feet_[i];
+    bool known = false;
+    for (const ConstraintPlane& other : out)
+      known = known || (other.owner == plane.owner && other.normal == plane.normal);
+    if (known) continue;
+    const double apart = plane.normal.dot(position) - plane.offset - plane.skin;
+    const Vec3 foot = entries_[plane.owner].touch->to_world(plane.contact.point);
+    // Feet found on the way stay as long as the ball is about as near to them as their surface bends.
+    const double around = radius_ + plane.skin;
+    if (apart > 0.1 * around || (position - foot).squaredNorm() > 2.0 * around * around) {
+      feet_.swap_remove(i);
+    } else {
+      out.push_back(plane);
+    }
+  }
+}
+
+double JointSolve::free_share(const Segment& motion) noexcept {
+  double share = 1.0;
+  for (Entry& entry : entries_) {
+    const Touched& touch = *entry.touch;
+    const Sides sides = touch.instance->sides;
+    const Segment local = touch.to_local(motion);
+    if (entry.patch != nullptr) {
+      share = std::min(share, entry.patch->segment(local, radius_ + margin_, sides).t);
+    } else if (!entry.smooth) {
+      share = std::min(share, std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin_, sides).t);
+    } else {
+      const SweptHit hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
+      // The centre itself must stay outside: half of the ball before what it meets.
+      const double length = (motion.to - motion.from).norm();
+      if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin_) / length));
+    }
+  }
+  return share;
+}
+
+Vec3 JointSolve::pushed_out(Vec3 position, bool& clear) noexcept {
+  clear = false;
+  for (int push = 0; push < most_pushes && !clear; ++push) {
+    clear = true;
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      if (!entries_[i].smooth) continue;
+      ConstraintPlane plane;
+      if (!foot_plane(i, position, plane)) continue;
+      remember(plane);
+      const double missing = plane.offset + plane.skin - plane.normal.dot(position);
+      if (missing <= 0.25 * entries_[i].skin) continue;
+      position += missing * plane.normal;
+      clear = false;
+    }
+  }
+  return position;
+}
+
+/// Along the step and out of what is met there, or along a part of it. False when no part of it comes nearer.
+bool JointSolve::advance(const Vec3& whole, const Vec3& goal, Vec3& proxy) noexcept {
+  Vec3 step = whole;
+  const double length = step.norm();
+  if (length > longest_step_) step *= longest_step_ / length;
+  const double distance = (proxy - goal).norm();
+  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    Vec3 next = proxy + free_share({proxy, proxy + step}) * step;
+    bool clear = false;
+    const Vec3 out = pushed_out(next, clear);
+    if (out != next) next += free_share({next, out}) * (out - next);
+    if (clear && (next - goal).norm() < distance - 1e-2 * tolerance_) {
+      proxy = next;
+      return true;
+    }
+    step *= 0.35;
+    if (step.norm() <= tolerance_) break;
+  }
+  return false;
+}
+
+ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcept {
+  // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
+  // either side is left before the other is felt; and a ball right above the edge it rolls over may stop, or roll in
+  // larger steps.
+  constexpr int patience = 8;
+  constexpr double least_gain = 1e-6;
+  const int most_moves = smooth_ ? 16 : 64;
+  tolerance_ = infinity;
+  for (const Entry& entry : entries_) {
+    if (!smooth_) {
+      tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);
+      continue;
+    }
+    const double rest = entry.smooth ? rest_of_grain * entry.grain : rest_of_skin_beside_smooth * entry.skin;
+    tolerance_ = tolerance_ == infinity ? rest : std::max(tolerance_, rest);
+  }
+  ConstraintSolution solution;
+  solution.proxy = from;
+  PlaneSet earlier;
+  double distance = infinity;
+  double stride = 1.0;
+  for (int move = 0; move < most_moves; ++move) {
+    const bool patient = !smooth_ && move >= patience;
+    if (patient) earlier = solution.planes;
+    solution.planes.clear();
+    touched(solution.proxy, solution.planes);
+    const bool single = solution.planes.size() == 1;
+    const bool rolling = !smooth_ && move > 0 && single && rolls(solution.planes[0]);
+    Vec3 target = single && !smooth_ ? onto_plane(goal, solution.planes[0])
+                                     : project_onto_planes(goal, solution.planes, true).point;
+    const Vec3 foot =
+        rolling ? entries_[solution.planes[0].owner].touch->to_world(solution.planes[0].contact.point) : goal;
+    if (rolling) target = rolling_target(solution.planes[0], foot, goal, target);
+    Vec3 step = target - solution.proxy;
+    if (step.norm() <= tolerance_) {
+      // Without contact nothing may remain between proxy and probe: free space gives no force at all.
+      if (solution.planes.empty()) solution.proxy = target;
+      solution.converged = true;
+      break;
+    }
+    if (smooth_) {
+      // No motion comes nearer: a local minimum, found by trying.
+      solution.converged = !advance(step, goal, solution.proxy);
+      if (solution.converged) break;
+      continue;
+    }
+    if (rolling && patient) {
+      if ((goal - foot).dot(solution.planes[0].normal) < 0.0) {
+        // The edge is between ball and goal: the ball rolls off it, slowly at first.
+        stride *= 2.0;
+        step *= std::min(stride, 0.2 * (solution.proxy - foot).norm() / step.norm());
+      } else {
+        const double now = (solution.proxy - goal).norm();
+        solution.converged = std::exchange(distance, now) - now < least_gain * now;
+        if (solution.converged) break;
+      }
+    } else if (patient && move % 4 == 0) {
+      PlaneSet both = solution.planes;
+      for (const ConstraintPlane& plane : earlier) both.push_back(plane);
+      step = project_onto_planes(goal, both, true).point - solution.proxy;
+    }
+    const double t = free_share({solution.proxy, solution.proxy + step});
+    solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
+  }
+  solution.projection = project_onto_planes(goal, solution.planes, false);
+  return solution;
+}
+
+void JointSolve::remember_places(std::size_t index, const ConstraintSolution& solution) noexcept {
+  const Entry& entry = entries_[index];
+  const Touched& touch = *entry.touch;
+  OfSurface& state = touch.contact->surface;
+  state.places.clear();
+  double strongest = 0.0;
+  for (const PlaneProjection::Active& active : solution.projection.active) {
+    const ConstraintPlane& plane = solution.planes[active.plane];
+    if (plane.owner != index) continue;
+    const Vec3 normal = touch.turned_back(plane.normal);
+    Place place{plane.contact.element, false, plane.contact.at};
+    if (entry.smooth) {
+      place.back =
+          on_smooth_view(touch.view, [&](const auto& view) { return normal.dot(view.front(plane.contact)) < 0.0; });
+    } else if (entry.patch == nullptr) {
+      const TriangleMesh& mesh = std::get_if<TriangleView>(&touch.view)->surface().mesh();
+      const Vec3 face = mesh.face_normal(place.element);
+      place.back = normal.dot(face) < 0.0;
+      if (active.multiplier > strongest) state.height = face.dot(touch.to_local(solution.proxy) - plane.contact.point);
+    }
+    state.places.push_back(place);
+    if (!(active.multiplier > strongest)) continue;
+    strongest = active.multiplier;
+    state.normal = normal;
+    std::swap(state.places[0], state.places[state.places.size() - 1]);
+  }
+  if (state.places.empty() && entry.smooth && entry.near.known()) state.places.push_back(entry.near);
+}
+
+namespace {
+
+/// Normal of the relief as it is rendered: blended over edges where faces disagree, in the base face's plane.
+Vec3 blended_normal(const ReliefSurface& relief, const Foot& contact) noexcept {
+  const BarycentricFrame frame = barycentric_frame(relief.base().mesh(), contact.element);
+  const HeightJet jet = relief.height(relief.frame(contact.element), contact.at[1], contact.at[2]);
+  return (frame.normal - jet.u * frame.gradient[1] - jet.v * frame.gradient[2]).normalized();
+}
+
+/// Direction that force shading turns a contact's force into: the coat's normal map, or the smoothed mesh, on the side
+/// touched. Object frame.
+Vec3 shading_normal(const Instance& instance, Formulation formulation, const Foot& contact) noexcept {
+  const TriangleMesh& mesh = constraint_mesh(instance)->mesh();
+  Vec3 normal = Vec3::Zero();
+  if (const ReliefSurface* relief = relief_of(instance)) {
+    const bool given = relief->coat().maps_on(contact.element).has_normal_map();
+    normal = formulation == Formulation::consistent && !given ? blended_normal(*relief, contact)
+                                                              : relief->coat_sample(contact.element, contact.at).normal;
+  } else {
+    normal = interpolated_normal(mesh, contact.element, contact.at);
+  }
+  return contact.normal.dot(mesh.face_normal(contact.element)) < 0.0 ? Vec3(-normal) : normal;
+}
+
+}  // namespace
+
+void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact, LawForce& answer) noexcept {
+  const Vec3 shading = touch.pose->rotate(shading_normal(*touch.instance, law.formulation, contact));
+  if (law.formulation == Formulation::literal) {
+    answer.normal = shading;
+    answer.force = answer.force.norm() * shading;
+    return;
+  }
+  // The slope that the normal stands for, times the push.
+  constexpr double least_rise = 0.1;
+  const double rise = std::max(least_rise, shading.dot(answer.normal));
+  answer.turn = answer.force.norm() / rise * (shading - shading.dot(answer.normal) * answer.normal);
+}
+
+LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
+                     const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
+  LawForce answer;
+  Vec3 spring = Vec3::Zero();
+  double strongest = 0.0;
+  double strongest_of_all = 0.0;
+  const ConstraintPlane* plane = nullptr;
+  for (const PlaneProjection::Active& active : solution.projection.active) {
+    strongest_of_all = std::max(strongest_of_all, active.multiplier);
+    if (solution.planes[active.plane].owner != owner) continue;
+    spring += active.multiplier * solution.planes[active.plane].normal;
+    if (active.multiplier <= strongest) continue;
+    strongest = active.multiplier;
+    plane = &solution.planes[active.plane];
+  }
+  if (plane == nullptr) return answer;
+  answer.contact = true;
+  answer.penetration = spring.norm();
+  answer.normal = spring / answer.penetration;
+  answer.force = material.stiffness * spring;
+  // Not at rest yet: the spring runs to where the proxy really is.
+  const bool settled = solution.converged && solution.projection.feasible;
+  // Once: by the owner that pushes most.
+  if (!settled && strongest != strongest_of_all) return {};
+  if (!settled) answer.force = material.stiffness * (solution.proxy - goal);
+  if (const auto* law = std::get_if<ForceShadingLaw>(&touch.instance->law)) shade(touch, *law, plane->contact, answer);
+  if (strongest == strongest_of_all) answer.force += material.stiffness * (goal - probe.pose.position);
+  answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
+  answer.point = touch.pose->apply(plane->contact.point);
+  answer.element = plane->contact.element;
+  return answer;
+}
+
+}  // namespace asperity

@@ -1,0 +1,161 @@
+#pragma once
+// The joint solve: one proxy, a point or a ball, among the surfaces around it. For everything but a point on one smooth
+// surface.
+
+#include "asperity/render/contact/coulomb.h"
+#include "asperity/render/contact/generated_geometry.h"
+#include "asperity/render/contact/planes.h"
+#include "asperity/render/felt.h"
+#include "asperity/render/laws/forces.h"
+
+namespace asperity {
+
+/// Facets for as many instances as one tick may hold, on the stack of a tick that needs them.
+using GeneratedPatches = FixedVector<GeneratedPatch, most_contacts>;
+
+/// The instances whose proxy is solved jointly this tick, in the world frame.
+class JointSolve {
+ public:
+  /// `patches`: where facets may be generated. [servo]
+  JointSolve(double probe_radius, GeneratedPatches* patches) noexcept : radius_(probe_radius), patches_(patches) {}
+  void add(Touched& touch) noexcept;
+  [[nodiscard]] bool empty() const noexcept { return entries_.empty(); }
+
+  /// Leads the ball from `from` to the place nearest to `goal` that the surfaces around leave free (Zilles and
+  /// Salisbury 1995). Repeats: planes of what it touches; the point nearest to the goal within them (at most three
+  /// active); a motion there that passes nothing. Among smooth surfaces the ball is pushed out of what it meets, and a
+  /// motion is accepted only where it ends nearer to the goal. [servo]
+  ConstraintSolution solve(const Vec3& from, const Vec3& goal) noexcept;
+  /// The same with the friction of the plane that pushes most: each round leads the proxy to the probe as far as the
+  /// cone lets it go. `goal` becomes where a proxy without friction would have been led. [servo]
+  template <class FrictionOf>
+  ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
+                                         const FrictionOf& friction_of) noexcept;
+  /// Where the ball is pushed out of smooth surfaces that it overlaps; `clear` tells whether it overlaps none any more.
+  /// [servo]
+  [[nodiscard]] Vec3 pushed_out(Vec3 position, bool& clear) noexcept;
+
+  [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
+  [[nodiscard]] Touched& touch(std::size_t index) const noexcept { return *entries_[index].touch; }
+  /// Whether every query was answered from everything around it. [servo]
+  [[nodiscard]] bool complete() const noexcept;
+  /// Tells the contact of entry `index` where it is touched, or nearest. [servo]
+  void remember_places(std::size_t index, const ConstraintSolution& solution) noexcept;
+
+ private:
+  struct Entry {
+    Touched* touch = nullptr;
+    GeneratedPatch* patch = nullptr;  ///< facets, where the law makes them
+    bool smooth = false;
+    double skin = 0.0;
+    double grain = 0.0;   ///< smooth: smallest length over which it changes (m)
+    double direct = 0.0;  ///< smooth: direction_from
+    bool folds = false;
+    Place near;  ///< smooth: found last, to be tried first
+  };
+
+  [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin_ + entry.skin; }
+  [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
+  void touched(const Vec3& position, PlaneSet& out) noexcept;
+  [[nodiscard]] double free_share(const Segment& motion) noexcept;
+  [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
+  void remember(const ConstraintPlane& plane) noexcept;
+  [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept {
+    return radius_ > 0.0 && plane.contact.at.minCoeff() <= 0.0;
+  }
+
+  double radius_;
+  GeneratedPatches* patches_;
+  FixedVector<Entry, most_contacts> entries_;
+  FixedVector<ConstraintPlane, 6> feet_;  ///< of smooth surfaces, found while the ball moved
+  bool smooth_ = false;                   ///< any of them is
+  double margin_ = 0.0;          ///< by which the ball is blown up, so that a point has a surface of its own (m)
+  double tolerance_ = infinity;  ///< below which a further move is not worth making (m)
+  double longest_step_ = infinity;
+};
+
+/// The coefficients and the normal that friction on several planes goes by: those of the one that pushes most.
+struct Hold {
+  Friction friction;
+  Vec3 normal = Vec3::Zero();
+};
+/// [servo]
+template <class FrictionOf>
+Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const FrictionOf& friction_of) noexcept {
+  const PlaneProjection projection = project_onto_planes(goal, planes, false);
+  Hold hold;
+  double strongest = 0.0;
+  for (const PlaneProjection::Active& active : projection.active) {
+    if (active.multiplier <= strongest) continue;
+    strongest = active.multiplier;
+    hold.friction = friction_of(planes[active.plane].owner);
+  }
+  const Vec3 push = projection.point - goal;
+  const double length = push.norm();
+  if (length > 0.0) hold.normal = push / length;
+  return hold;
+}
+
+template <class FrictionOf>
+ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
+                                                   const FrictionOf& friction_of) noexcept {
+  constexpr int most_rounds = 4;
+  ConstraintSolution solution;
+  Vec3 proxy = from;
+  PlaneSet planes;
+  touched(proxy, planes);
+  bool slid = false;
+  bool landed = false;
+  for (int round = 0; round < most_rounds; ++round) {
+    const Hold hold = strongest_hold(planes, probe, friction_of);
+    if (hold.friction.still <= 0.0 || hold.normal.isZero()) {
+      // In free space, or without friction, the proxy goes all the way; what it meets then decides.
+      goal = probe;
+      solution = solve(proxy, goal);
+      const bool met = planes.empty() && !solution.planes.empty() && round == 0 &&
+                       strongest_hold(solution.planes, probe, friction_of).friction.still > 0.0;
+      if (!met) {
+        sliding = false;
+        return solution;
+      }
+      // It met something with friction: it would have stopped there, not slid on for nothing.
+      planes = solution.planes;
+      proxy = solution.proxy;
+      landed = true;
+      continue;
+    }
+    const bool slipped = slips(hold.friction, proxy, hold.normal, probe, sliding, [&] {
+      goal = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
+      solution = solve(proxy, goal);
+      return solution.proxy;
+    });
+    if (!slipped) {
+      sliding = sliding || (slid && !landed);
+      // The spring's force is its own, whatever its direction: what the planes hold is the push, the rest is
+      // friction's.
+      solution = {};
+      solution.proxy = proxy;
+      solution.planes = planes;
+      solution.converged = true;
+      solution.projection = project_onto_planes(probe, planes, false);
+      goal = proxy - (solution.projection.point - probe);
+      solution.projection.point = proxy;
+      return solution;
+    }
+    slid = true;
+    proxy = solution.proxy;
+    planes = solution.planes;
+  }
+  return solution;
+}
+
+/// Turns a contact's force as force shading does; its consistent form puts the lateral force into `answer.turn`.
+/// [servo]
+void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact, LawForce& answer) noexcept;
+/// Force of one owner among solved planes, world frame: its share of the spring from `goal`, and, for the owner that
+/// pushes most, what friction holds (from the goal on to the probe); shaded and damped as its law and material say.
+/// [servo]
+LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
+                     const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept;
+
+}  // namespace asperity

@@ -1,0 +1,141 @@
+#include "asperity/render/contact/planes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+
+namespace asperity {
+
+namespace {
+
+// Two planes count as independent above this squared sine of the angle between them.
+constexpr double least_determinant = 1e-12;
+
+/// Rounding of products of coordinates that add up to `size` (m), with room.
+double rounding_of(double size) noexcept {
+  return 1e-14 * size + 1e-300;
+}
+
+class ActiveSet {
+ public:
+  ActiveSet(const Vec3& goal, const PlaneSet& planes, bool with_skin) noexcept : goal_(goal), planes_(planes) {
+    double size = goal.norm();
+    for (std::size_t i = 0; i < planes.size(); ++i) {
+      const double offset = planes[i].offset + (with_skin ? planes[i].skin : 0.0);
+      violation_[i] = offset - planes[i].normal.dot(goal);
+      size += std::abs(violation_[i]);
+    }
+    tolerance_ = rounding_of(size);
+  }
+
+  PlaneProjection solve() noexcept {
+    const std::size_t n = planes_.size();
+    if (none()) return best_;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (violation_[i] > 0.0 && accept({{i, violation_[i]}})) return best_;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        if (pair(i, j)) return best_;
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        for (std::size_t k = j + 1; k < n; ++k) {
+          if (triple(i, j, k)) return best_;
+        }
+      }
+    }
+    return best_;
+  }
+
+ private:
+  using Active = PlaneProjection::Active;
+
+  [[nodiscard]] double gram(std::size_t i, std::size_t j) const noexcept {
+    return planes_[i].normal.dot(planes_[j].normal);
+  }
+
+  bool none() noexcept {
+    for (std::size_t i = 0; i < planes_.size(); ++i) least_worst_ = std::max(least_worst_, violation_[i]);
+    best_.point = goal_;
+    best_.feasible = least_worst_ <= 0.0;
+    return best_.feasible;
+  }
+
+  bool pair(std::size_t i, std::size_t j) noexcept {
+    const double g = gram(i, j);
+    const double determinant = 1.0 - g * g;
+    if (determinant < least_determinant) return false;
+    const double a = (violation_[i] - g * violation_[j]) / determinant;
+    const double b = (violation_[j] - g * violation_[i]) / determinant;
+    return a >= 0.0 && b >= 0.0 && accept({{i, a}, {j, b}});
+  }
+
+  bool triple(std::size_t i, std::size_t j, std::size_t k) noexcept {
+    const Vec3 jk = planes_[j].normal.cross(planes_[k].normal);
+    const Vec3 ki = planes_[k].normal.cross(planes_[i].normal);
+    const Vec3 ij = planes_[i].normal.cross(planes_[j].normal);
+    const double determinant = planes_[i].normal.dot(jk);
+    if (determinant * determinant < least_determinant) return false;
+    // The corner seen from the goal, expressed in the three normals.
+    const Vec3 offset = (violation_[i] * jk + violation_[j] * ki + violation_[k] * ij) / determinant;
+    const double a = offset.dot(jk) / determinant;
+    const double b = offset.dot(ki) / determinant;
+    const double c = offset.dot(ij) / determinant;
+    return a >= 0.0 && b >= 0.0 && c >= 0.0 && accept({{i, a}, {j, b}, {k, c}});
+  }
+
+  /// Takes the choice if it violates no plane; remembers the least bad one otherwise.
+  bool accept(std::initializer_list<Active> active) noexcept {
+    Vec3 moved = Vec3::Zero();
+    for (const Active& one : active) moved += one.multiplier * planes_[one.plane].normal;
+    double worst = 0.0;
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      worst = std::max(worst, violation_[i] - planes_[i].normal.dot(moved));
+    }
+    const bool feasible = worst <= tolerance_;
+    if (!feasible && worst >= least_worst_) return false;
+    least_worst_ = worst;
+    best_.feasible = feasible;
+    best_.point = goal_ + moved;
+    best_.active.clear();
+    for (const Active& one : active) {
+      if (one.multiplier > 0.0) best_.active.push_back(one);
+    }
+    return feasible;
+  }
+
+  const Vec3& goal_;
+  const PlaneSet& planes_;
+  double violation_[PlaneSet::capacity()];
+  double tolerance_ = 0.0;
+  double least_worst_ = 0.0;
+  PlaneProjection best_;
+};
+
+/// The same choices where there is one plane.
+PlaneProjection project_onto_one(const Vec3& goal, const ConstraintPlane& plane, bool with_skin) noexcept {
+  PlaneProjection best;
+  const double violation = plane.offset + (with_skin ? plane.skin : 0.0) - plane.normal.dot(goal);
+  best.point = goal;
+  best.feasible = violation <= 0.0;
+  if (best.feasible) return best;
+  const Vec3 moved = Vec3::Zero() + violation * plane.normal;
+  const double worst = std::max(0.0, violation - plane.normal.dot(moved));
+  const bool feasible = worst <= rounding_of(goal.norm() + std::abs(violation));
+  if (!feasible && worst >= violation) return best;
+  best.feasible = feasible;
+  best.point = goal + moved;
+  best.active.push_back({0, violation});
+  return best;
+}
+
+}  // namespace
+
+PlaneProjection project_onto_planes(const Vec3& goal, const PlaneSet& planes, bool with_skin) noexcept {
+  if (planes.size() == 1) return project_onto_one(goal, planes[0], with_skin);
+  return ActiveSet(goal, planes, with_skin).solve();
+}
+
+}  // namespace asperity

@@ -1,0 +1,86 @@
+#pragma once
+// What is felt of an instance during one tick: the one visit of its surface.
+
+#include <utility>
+#include <variant>
+
+#include "asperity/render/instance.h"
+#include "asperity/render/state.h"
+
+namespace asperity {
+
+/// Any provider's view; nothing before it is chosen.
+using FeltView = std::variant<std::monostate, TriangleView, ReliefView, IsoView, ParametricView, CustomView>;
+
+/// Calls visit(view) with the view that is held, and answers what that answers; a default of it where none is. [servo]
+template <class Visit>
+auto on_view(const FeltView& view, Visit&& visit) noexcept {
+  using Answer = decltype(visit(std::declval<const TriangleView&>()));
+  if (const auto* mesh = std::get_if<TriangleView>(&view)) return visit(*mesh);
+  if (const auto* relief = std::get_if<ReliefView>(&view)) return visit(*relief);
+  if (const auto* iso = std::get_if<IsoView>(&view)) return visit(*iso);
+  if (const auto* parametric = std::get_if<ParametricView>(&view)) return visit(*parametric);
+  if (const auto* custom = std::get_if<CustomView>(&view)) return visit(*custom);
+  return Answer();
+}
+/// The same for what a point's proxy rests on without triangles. [servo]
+template <class Visit>
+auto on_smooth_view(const FeltView& view, Visit&& visit) noexcept {
+  return on_view(view, [&]<class V>(const V& held) -> decltype(visit(std::declval<const ReliefView&>())) {
+    if constexpr (SurfaceView<V>) {
+      return visit(held);
+    } else {
+      return decltype(visit(std::declval<const ReliefView&>()))();
+    }
+  });
+}
+
+/// The mesh that a law constrains the proxy with: the dense one, the base of a coated surface, the mesh itself. [servo]
+inline const MeshSurface* constraint_mesh(const Instance& instance) noexcept {
+  return std::holds_alternative<DenseMeshLaw>(instance.law) ? &instance.dense->surface : base_of(instance.surface);
+}
+
+/// Whether the proxy is led along the surface itself rather than along triangles. [servo]
+inline bool follows_smoothly(const Instance& instance) noexcept {
+  return std::holds_alternative<ProxyLaw>(instance.law) && provider_of<MeshSurface>(instance.surface) == nullptr;
+}
+
+/// One instance in one tick.
+struct Touched {
+  const Instance* instance = nullptr;
+  const InstanceFacts* facts = nullptr;
+  Contact* contact = nullptr;
+  SurfaceCache* cache = nullptr;
+  const Pose* pose = nullptr;    ///< of the instance now
+  const Pose* before = nullptr;  ///< at the last tick
+  bool at_origin = true;         ///< `pose` is the identity: nothing to transform
+  bool moved = false;            ///< it has changed under the probe since the last tick
+  CoatMoment moment = {};        ///< of the coat, felt now
+  FeltView view = {};            ///< once all of this is known
+
+  /// Where a point's proxy rests on it; unknown where none does.
+  [[nodiscard]] Place resting_place() const noexcept { return contact->surface.rests ? contact->first() : Place{}; }
+  [[nodiscard]] Vec3 to_local(const Vec3& p) const noexcept { return at_origin ? p : pose->apply_inverse(p); }
+  [[nodiscard]] Vec3 to_world(const Vec3& p) const noexcept { return at_origin ? p : pose->apply(p); }
+  [[nodiscard]] Vec3 turned(const Vec3& v) const noexcept { return at_origin ? v : pose->rotate(v); }
+  [[nodiscard]] Vec3 turned_back(const Vec3& v) const noexcept { return at_origin ? v : pose->rotate_inverse(v); }
+  [[nodiscard]] Segment to_local(const Segment& motion) const noexcept {
+    return {to_local(motion.from), to_local(motion.to)};
+  }
+};
+
+/// The surface as the instance's law feels it, at its contact's threshold and level and a moment of its coat. [servo]
+inline FeltView felt_view(const Touched& touch) noexcept {
+  const Instance& instance = *touch.instance;
+  SurfaceCache& cache = *touch.cache;
+  if (const auto* relief = provider_of<ReliefSurface>(instance.surface);
+      relief != nullptr && (touch.facts->smooth || !touch.facts->constrains))
+    return relief->view(cache, touch.moment);
+  if (const IsoSurface* iso = iso_of(instance.surface))
+    return iso->view(cache.cells, touch.contact->surface.level, touch.contact->surface.threshold);
+  if (const ParametricSurface* parametric = parametric_of(instance.surface)) return parametric->view();
+  if (const CustomSurface* custom = custom_of(instance.surface)) return custom->view();
+  return constraint_mesh(instance)->view(cache);
+}
+
+}  // namespace asperity

@@ -1,0 +1,137 @@
+// Height-field rendering over base triangles: haptic-textures-2005, 3.3, and Algorithm 1 of hrm-2010.
+
+#include <cmath>
+
+#include "asperity/render/laws/forces.h"
+
+namespace asperity {
+
+namespace {
+
+struct Taper {
+  double factor = 1.0;
+  double by_u = 0.0;  ///< its change with the barycentric coordinates of the second and third corner
+  double by_v = 0.0;
+};
+
+/// Falls from 1 to 0 over the outer `width` of each barycentric coordinate, smoothly.
+Taper edge_taper(double width, const Vec3& barycentric) noexcept {
+  Taper taper;
+  if (width <= 0.0) return taper;
+  double value[3];
+  double slope[3];
+  for (int k = 0; k < 3; ++k) {
+    const double t = std::clamp(barycentric[k] / width, 0.0, 1.0);
+    value[k] = t * t * (3.0 - 2.0 * t);
+    slope[k] = 6.0 * t * (1.0 - t) / width;
+  }
+  taper.factor = value[0] * value[1] * value[2];
+  const double by[3] = {slope[0] * value[1] * value[2], value[0] * slope[1] * value[2], value[0] * value[1] * slope[2]};
+  taper.by_u = by[1] - by[0];
+  taper.by_v = by[2] - by[0];
+  return taper;
+}
+
+/// As printed: among the prisms that hold the probe, the one whose height field it is deepest under (2005: "the
+/// algorithm compares the heights in the textures of both triangles").
+LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, double stiffness, const Vec3& probe,
+                       const CoatMoment& moment) noexcept {
+  const TriangleMesh& mesh = surface.base().mesh();
+  const Prisms prisms = surface.prisms();
+  LawForce answer;
+  Box around;
+  around.include(probe);
+  surface.base().index().for_each_in_box(around.grown(prisms.half_height()), [&](std::uint32_t face) {
+    if (!prisms.contains(face, probe)) return;
+    const BarycentricFrame frame = barycentric_frame(mesh, face);
+    const Vec3 barycentric = frame.coordinates(probe);
+    const double height =
+        edge_taper(law.edge_taper, barycentric).factor * surface.coat_sample(face, barycentric, moment).height;
+    const double penetration = height - std::abs(frame.height(probe));
+    const bool deeper =
+        penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
+    if (penetration <= 0.0 || !deeper) return;
+    answer.contact = true;
+    answer.force = stiffness * penetration * frame.normal;
+    answer.point = probe + penetration * frame.normal;
+    answer.normal = frame.normal;
+    answer.penetration = penetration;
+    answer.height = height;
+    answer.element = face;
+  });
+  return answer;
+}
+
+/// h - H in shell coordinates, with the owner's own heights.
+LawForce consistent_force(const HeightFieldLaw& law, const ReliefView& view, double stiffness, const Vec3& probe,
+                          Contact& contact) noexcept {
+  const ShellContact at = shell_contact(view, probe);
+  if (!at.found) return {};
+  FieldSample sample = at.located ? view.surface().own_field(at.frame, at.place) : view.eval(probe);
+  if (at.located && law.edge_taper > 0.0) {
+    // Phi = h - taper H: what own_field gave is h - H.
+    const Taper taper = edge_taper(law.edge_taper, at.place.barycentric());
+    const double height = sample.height;
+    const ShellGradients gradients = shell_gradients(at.frame.prism, at.place);
+    const Vec3 height_gradient = gradients.height - sample.gradient;
+    const Vec3 taper_gradient = taper.by_u * gradients.u + taper.by_v * gradients.v;
+    sample.value = at.place.height - taper.factor * height;
+    sample.gradient = gradients.height - taper.factor * height_gradient - height * taper_gradient;
+    sample.height = taper.factor * height;
+  }
+  return potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim, stiffness,
+                           probe, contact);
+}
+
+}  // namespace
+
+LawForce height_field_force(const HeightFieldLaw& law, const ReliefView& view, const Material& material,
+                            const Vec3& probe, Contact& contact) noexcept {
+  return law.formulation == Formulation::literal
+             ? literal_force(law, view.surface(), material.stiffness, probe, view.moment())
+             : consistent_force(law, view, material.stiffness, probe, contact);
+}
+
+ShellContact shell_contact(const ReliefView& view, const Vec3& probe) noexcept {
+  const MeshSurface& base = view.surface().base();
+  ShellContact contact;
+  contact.located = view.locate(probe, contact.frame, contact.place);
+  // The nearest base point, from the patch that locating just used.
+  const Foot nearest = view.nearest_base(probe);
+  contact.found = nearest.found();
+  if (contact.found && !base.mesh().report().closed())
+    contact.beyond_rim = beyond_rim(base.mesh(), nearest, probe, view.skin());
+  return contact;
+}
+
+LawForce potential_contact(double value, const Vec3& gradient, double height, std::uint32_t element, bool beyond_rim,
+                           double stiffness, const Vec3& probe, Contact& contact) noexcept {
+  LawForce answer;
+  answer.height = height;
+  answer.element = element;
+  if (beyond_rim) {
+    contact.seen_outside = false;
+    return answer;
+  }
+  if (value >= 0.0) {
+    contact.seen_outside = true;
+    return answer;
+  }
+  const double steepness = gradient.norm();
+  if (!contact.seen_outside || steepness == 0.0) return answer;
+  answer.contact = true;
+  answer.force = -stiffness * value * gradient;
+  answer.normal = gradient / steepness;
+  answer.penetration = -value;
+  answer.point = probe - value / steepness * answer.normal;
+  return answer;
+}
+
+Vec3 with_damping(const Vec3& force, const Vec3& normal, const Vec3& velocity, double damping) noexcept {
+  if (damping == 0.0) return force;
+  const double push = force.dot(normal);
+  const double damped = std::max(0.0, push - damping * velocity.dot(normal));
+  return force + (damped - push) * normal;
+}
+
+}  // namespace asperity

@@ -1,0 +1,304 @@
+#include <algorithm>
+#include <optional>
+
+#include "asperity/render/contact/fine.h"
+#include "asperity/render/contact/level.h"
+#include "asperity/render/custom_law.h"
+#include "asperity/render/local_material.h"
+#include "asperity/render/stages/limits.h"
+#include "asperity/render/stages/tick.h"
+
+namespace asperity {
+
+namespace {
+
+void add_contact(Tick& tick, const Touched& touch, const LawForce& law) noexcept {
+  ForceSample& out = tick.out;
+  if (!law.contact) {
+    if (out.contact.count == 0 && law.element != no_index) out.contact.height = law.height;
+    return;
+  }
+  out.flags.set(TickFlag::contact);
+  out.wrench.force += law.force;
+  out.parts.friction += law.friction;
+  out.parts.texture += law.texture;
+  out.parts.held += law.held;
+  ++out.contact.count;
+  const double size = law.force.norm();
+  if (size <= tick.strongest) return;
+  tick.strongest = size;
+  const std::uint32_t count = out.contact.count;
+  out.contact = {count,      touch.contact->instance, law.element, law.point,
+                 law.normal, law.penetration,         law.height,  touch.contact->surface.places};
+}
+
+/// What the law of an instance without a proxy answers, object frame. `material`: felt at the probe.
+struct AskLaw {
+  const Touched& touch;
+  const Material& material;
+  const Vec3& probe;
+  const Vec3& velocity;
+  Seconds dt;
+
+  LawForce operator()(const HeightFieldLaw& law) const noexcept {
+    return height_field_force(law, relief(), material, probe, *touch.contact);
+  }
+  LawForce operator()(const MesostructureLaw& law) const noexcept {
+    return mesostructure_force(law, relief(), material, probe, *touch.contact);
+  }
+  LawForce operator()(const AvilaLaw& law) const noexcept {
+    return avila_force(law, *iso_of(touch.instance->surface), iso(), material, probe, velocity, *touch.contact);
+  }
+  LawForce operator()(const CrossUncrossLaw& law) const noexcept {
+    return cross_uncross_force(law, iso(), material, probe, velocity, *touch.contact);
+  }
+  LawForce operator()(const VirtualContactPointLaw& law) const noexcept {
+    return virtual_contact_force(law, implicit(), own(), probe, velocity, dt, *touch.contact, *touch.cache);
+  }
+  LawForce operator()(const MagneticLaw& law) const noexcept {
+    return magnetic_force(law, implicit(), own(), probe, velocity, dt, *touch.contact, *touch.cache);
+  }
+  LawForce operator()(const NormalPerturbationLaw&) const noexcept {
+    return normal_perturbation_force(implicit(), material, probe, *touch.contact, *touch.cache);
+  }
+  LawForce operator()(const std::shared_ptr<const CustomLaw>& law) const noexcept {
+    return law->force(*touch.instance, touch.view, material, probe, velocity, dt, *touch.contact);
+  }
+  // What moves the proxy is not asked.
+  template <class Other>
+  LawForce operator()(const Other&) const noexcept {
+    return {};
+  }
+
+  [[nodiscard]] const ReliefView& relief() const noexcept { return *std::get_if<ReliefView>(&touch.view); }
+  [[nodiscard]] const IsoView& iso() const noexcept { return *std::get_if<IsoView>(&touch.view); }
+  [[nodiscard]] const ImplicitSurface& implicit() const noexcept { return *implicit_of(touch.instance->surface); }
+  /// Where friction is a force of its own the contact point is not held back as well.
+  [[nodiscard]] Material own() const noexcept {
+    Material mine = touch.instance->material;
+    mine.friction_named = touch.facts->adds_friction;
+    return mine;
+  }
+};
+
+LawForce ask(const Touched& touch, const Material& material, const Vec3& probe, const Vec3& velocity,
+             Seconds dt) noexcept {
+  return std::visit(AskLaw{touch, material, probe, velocity, dt}, touch.instance->law);
+}
+
+/// Velocity of the probe over a moving instance (m/s, world).
+Vec3 velocity_over(const Tick& tick, const Touched& touch) noexcept {
+  const Vec3& velocity = tick.probe.twist.linear;
+  if (!touch.instance->motion.moves()) return velocity;
+  return velocity - touch.instance->motion.velocity_at(*touch.pose, tick.probe.pose.position, tick.probe.time);
+}
+
+/// The probe's motion as an instance sees it.
+FineMotion motion_over(const Tick& tick, const Touched& touch) noexcept {
+  const Vec3& position = tick.probe.pose.position;
+  const Vec3& previous = tick.state.previous_probe;
+  if (touch.instance->motion.moves()) {
+    return {touch.pose->apply_inverse(position) - touch.before->apply_inverse(previous),
+            touch.pose->rotate_inverse(velocity_over(tick, touch)), tick.dt};
+  }
+  return {touch.turned_back(position - previous), touch.turned_back(tick.probe.twist.linear), tick.dt};
+}
+
+/// A law's answer and its parts, turned into the world frame.
+void to_world(const Touched& touch, LawForce& law) noexcept {
+  if (touch.at_origin) return;
+  law.force = touch.pose->rotate(law.force);
+  law.friction = touch.pose->rotate(law.friction);
+  law.texture = touch.pose->rotate(law.texture);
+  law.point = touch.pose->apply(law.point);
+  law.normal = touch.pose->rotate(law.normal);
+}
+
+/// Whether a law's own changes are paid for: not those of volumes, which have budgets of their own, nor what is felt as
+/// printed.
+bool pays(const Instance& instance) noexcept {
+  if (iso_of(instance.surface) != nullptr) return false;
+  if (const auto* law = std::get_if<HeightFieldLaw>(&instance.law)) return law->formulation != Formulation::literal;
+  if (const auto* law = std::get_if<MesostructureLaw>(&instance.law)) return law->formulation != Formulation::literal;
+  return false;
+}
+
+double potential_of(const LawForce& law, double stiffness) noexcept {
+  return law.contact ? 0.5 * stiffness * law.penetration * law.penetration : 0.0;
+}
+
+/// Takes back what a surface would give by moving, beside what its law holds.
+void limit_drag(Tick& tick, const Touched& touch, const Vec3& point, LawForce& law) noexcept {
+  if (!touch.moved || (law.friction.isZero(0.0) && law.texture.isZero(0.0))) return;
+  // Where in the world the surface's point there has come from within the tick.
+  const Vec3 motion = point - touch.before->apply(touch.pose->apply_inverse(point));
+  const double share = carried_share(law.friction + law.texture, motion, tick.state.tank);
+  if (share >= 1.0) return;
+  law.force -= (1.0 - share) * (law.friction + law.texture);
+  law.friction *= share;
+  law.texture *= share;
+}
+
+/// World frame.
+void add_viscosity(double viscosity, const Vec3& velocity, LawForce& law) noexcept {
+  if (viscosity <= 0.0 || !law.contact) return;
+  law.friction -= viscosity * velocity;
+  law.force -= viscosity * velocity;
+}
+
+/// Pays for what a change of the surface, or of its stiffness, would add to a law's energy, and renders what is paid.
+/// Object frame. `previous`: the probe at the last tick.
+LawForce paid_force(Tick& tick, const Touched& touch, const Material& material, const Vec3& position,
+                    const Vec3& previous, const FineMotion& motion) noexcept {
+  PotentialMemory& memory = touch.contact->memory<PotentialMemory>();
+  EnergyTank& tank = tick.state.tank;
+  const bool stands = !tick.changed && !touch.moved;
+  if (memory.potential && !stands) {
+    Contact there = *touch.contact;
+    Touched before = touch;
+    before.contact = &there;
+    pay_for_change(potential_of(ask(before, material, previous, motion.velocity, tick.dt), material.stiffness), memory,
+                   tank);
+  }
+  LawForce law = ask(touch, material, position, motion.velocity, tick.dt);
+  if (!law.contact) memory.share = 1.0;
+  if (stands && law.contact && memory.potential && memory.stiffness > 0.0 && memory.stiffness != material.stiffness) {
+    // A stiffer place under the same depth holds more.
+    memory.potential = memory.share * potential_of(law, memory.stiffness);
+    pay_for_change(potential_of(law, material.stiffness), memory, tank);
+  }
+  memory.stiffness = law.contact ? material.stiffness : 0.0;
+  memory.potential = memory.share * potential_of(law, material.stiffness);
+  law.force *= memory.share;
+  tick.limited = tick.limited || memory.share < 1.0;
+  return law;
+}
+
+/// A law without a proxy, with friction and texture.
+void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
+  const Instance& instance = *touch.instance;
+  Contact& contact = *touch.contact;
+  const FineMotion motion = motion_over(tick, touch);
+  const bool volume = touch.facts->volume;
+  const Vec3 position = touch.to_local(tick.probe.pose.position);
+  const Vec3 previous = touch.pose->apply_inverse(tick.state.previous_probe);
+  // The contact point's laws look the material up where that is.
+  const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
+  const Material material = elsewhere ? instance.material : local_material(touch, position);
+  // A probe that enters within one tick was outside at the last one: ask there first.
+  const bool fresh = volume ? !contact.asked : !contact.seen_outside;
+  if (fresh && !tick.first) ask(touch, material, previous, motion.velocity, tick.dt);
+  LawForce law = pays(instance) ? paid_force(tick, touch, material, position, previous, motion)
+                                : ask(touch, material, position, motion.velocity, tick.dt);
+  contact.touching = law.contact;
+  // What it is held to goes along with a surface that changes.
+  contact.surface.rests = law.contact && !contact.surface.places.empty();
+  if (law.contact) {
+    if (volume) law.element = element_at(instance, contact.surface.level, law.point, *touch.cache);
+    if (!law.damped) {
+      law.push = law.force.dot(law.normal);
+      // Against the hand's own motion: damping by a surface that moves would drag the hand along.
+      law.force =
+          with_damping(law.force, law.normal, touch.pose->rotate_inverse(tick.probe.twist.linear), material.damping);
+    }
+  }
+  const bool adds = touch.facts->adds_friction;
+  if (instance.fine != nullptr || adds) {
+    const Material felt = elsewhere ? local_material(touch, law.point) : material;
+    if (add_fine_forces(touch, felt, adds, felt.stiffness, motion, tick.state.tank, law))
+      tick.out.flags.set(TickFlag::texture_faded);
+  }
+  to_world(touch, law);
+  add_viscosity(material.viscosity, velocity_over(tick, touch), law);
+  limit_drag(tick, touch, tick.probe.pose.position, law);
+  add_contact(tick, touch, law);
+  if (law.contact) shadow = law.point;
+}
+
+/// What friction and texture add to what a proxy answers, which is in the world frame.
+void add_to_proxy(Tick& tick, Part& part) noexcept {
+  LawForce& law = part.law;
+  Touched& touch = *part.touch;
+  const Instance& instance = *touch.instance;
+  const bool adds = touch.facts->adds_friction;
+  std::optional<Material> mapped;
+  if (touch.facts->varies && relief_of(instance) != nullptr)
+    mapped = local_material(touch, touch.pose->apply_inverse(law.point));
+  const Material& local = mapped ? *mapped : instance.material;
+  if (local.viscosity > 0.0) add_viscosity(local.viscosity, velocity_over(tick, touch), law);
+  if (!adds && instance.fine == nullptr) {
+    limit_drag(tick, touch, law.point, law);
+    if (law.contact && instance.material.static_friction > 0.0 && touch.facts->holds_friction)
+      law.friction = law.force - law.force.dot(law.normal) * law.normal;
+    return;
+  }
+  const double stiffness = tick.proxy_share * part.stiffness;
+  law.push = law.pulls ? 0.0 : stiffness * law.penetration;
+  if (!touch.at_origin) {
+    law.force = touch.pose->rotate_inverse(law.force);
+    law.point = touch.pose->apply_inverse(law.point);
+    law.normal = touch.pose->rotate_inverse(law.normal);
+    law.friction = touch.pose->rotate_inverse(law.friction);
+    if (law.bends) {
+      const Mat3 turn = touch.pose->orientation.toRotationMatrix();
+      law.bend = turn.transpose() * law.bend * turn;
+    }
+  }
+  const Vec3 kept = law.friction;
+  law.friction = Vec3::Zero();
+  const Material felt = implicit_of(instance.surface) != nullptr ? local_material(touch, law.point) : local;
+  if (add_fine_forces(touch, felt, adds, stiffness, motion_over(tick, touch), tick.state.tank, law))
+    tick.out.flags.set(TickFlag::texture_faded);
+  law.friction += kept;
+  to_world(touch, law);
+  limit_drag(tick, touch, law.point, law);
+}
+
+/// What draws the probe to an instance, where something does. Owes what a change of the surface would add to it, and
+/// rests until the tank has paid.
+void add_attraction(Tick& tick, Touched& touch) noexcept {
+  Contact& contact = *touch.contact;
+  if (tick.changed || touch.moved) {
+    const double now = attraction_at(touch, touch.pose->apply_inverse(tick.state.previous_probe)).potential;
+    contact.debt += std::max(0.0, now - contact.attraction);
+  }
+  contact.debt -= tick.state.tank.pay(contact.debt);
+  const Attraction pull = attraction_at(touch, touch.pose->apply_inverse(tick.probe.pose.position));
+  contact.attraction = pull.potential;
+  if (contact.debt > 0.0 || pull.force.isZero(0.0)) return;
+  tick.out.wrench.force += touch.pose->rotate(pull.force);
+  tick.out.flags.set(TickFlag::field_force);
+}
+
+/// What is felt of volumes without a surface.
+void add_effects(Tick& tick) noexcept {
+  for (const FieldEffect& effect : tick.scene.felt_effects()) {
+    CellPolynomial cache;
+    const int here = std::min(tick.level, effect.field->levels() - 1);
+    const Vec3 force = field_effect_force(effect, here, tick.probe.pose.position, tick.probe.twist.linear, cache);
+    if (force.isZero()) continue;
+    tick.out.flags.set(TickFlag::field_force);
+    tick.out.wrench.force += force;
+  }
+}
+
+}  // namespace
+
+void add(Tick& tick) noexcept {
+  Vec3 shadow = tick.felt;
+  for (Touched& touch : tick.touches) {
+    if (!touch.facts->constrains) add_law(tick, touch, shadow);
+  }
+  for (Part& part : tick.parts) {
+    add_to_proxy(tick, part);
+    add_contact(tick, *part.touch, part.law);
+    part.touch->contact->touching = part.law.contact;
+  }
+  tick.out.proxy = tick.parts.empty() ? shadow : tick.felt;
+  for (Touched& touch : tick.touches) {
+    if (touch.facts->draws) add_attraction(tick, touch);
+  }
+  add_effects(tick);
+}
+
+}  // namespace asperity

@@ -1,0 +1,59 @@
+#include <cmath>
+
+#include "asperity/render/stages/tick.h"
+
+namespace asperity {
+
+namespace {
+
+/// Spreads the change of the force over the scene's hand-over time, as far as the tank pays.
+Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
+  ProxyState& state = tick.state;
+  const bool new_scene = tick.changed && !tick.first;
+  if (!new_scene && state.residual.isZero(0.0)) return force;
+  const double time = tick.scene.settings().handover.count();
+  const Vec3 moved = tick.probe.pose.position - state.previous_probe;
+  // What the last tick's share of the old force has given since.
+  state.tank.pay(state.residual.dot(moved));
+  if (new_scene) state.residual = time > 0.0 ? Vec3(state.force - force) : Vec3(Vec3::Zero());
+  if (state.residual.isZero(0.0)) return force;
+  state.residual *= time > 0.0 ? std::exp(-tick.dt.count() / time) : 0.0;
+  constexpr double gone = 1e-6;  // N
+  if (state.residual.norm() < gone) {
+    state.residual = Vec3::Zero();
+    return force;
+  }
+  // It may give over the next tick what the tank holds: the hand moves as it did, or twice as far.
+  const double way = 2.0 * moved.norm() + 1e-7;
+  const double most = state.tank.level() / way;
+  const double size = state.residual.norm();
+  if (size > most) state.residual *= most / size;
+  return force + state.residual;
+}
+
+/// Forces as the hand feels them; places stay the scene's.
+void to_hand(const View& view, ForceSample& out) noexcept {
+  const auto turn = [&](Vec3& force) { force = view.orientation.conjugate() * force / view.zoom; };
+  turn(out.wrench.force);
+  turn(out.wrench.torque);
+  turn(out.parts.friction);
+  turn(out.parts.texture);
+}
+
+}  // namespace
+
+void answer(Tick& tick) noexcept {
+  ProxyState& state = tick.state;
+  ForceSample& out = tick.out;
+  out.wrench.force = handed_over(tick, out.wrench.force);
+  out.flags.set(TickFlag::not_converged, !tick.converged);
+  out.flags.set(TickFlag::energy_limited, tick.limited);
+  remember_sides(tick);
+  state.force = out.wrench.force;
+  state.previous_probe = tick.probe.pose.position;
+  state.previous_time = tick.probe.time;
+  state.workspace_probe = tick.workspace.pose.position;
+  if (!tick.direct) to_hand(tick.scene.settings().view, out);
+}
+
+}  // namespace asperity

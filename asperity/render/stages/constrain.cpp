@@ -1,0 +1,263 @@
+#include <algorithm>
+#include <optional>
+
+#include "asperity/render/contact/fine.h"
+#include "asperity/render/contact/joint.h"
+#include "asperity/render/contact/level.h"
+#include "asperity/render/contact/point.h"
+#include "asperity/render/local_material.h"
+#include "asperity/render/stages/tick.h"
+
+namespace asperity {
+
+namespace {
+
+/// A material's coefficients, and its grip; no coefficients unless the proxy itself holds the friction.
+Friction friction_of(const Touched& touch, const Material& material) noexcept {
+  const double grip = material.stickiness / material.stiffness;
+  if (!touch.facts->holds_friction) return {0.0, 0.0, grip};
+  return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction, grip};
+}
+
+/// What an instance is made of at a place (object frame): `room` holds it where that may differ from place to place.
+const Material& material_there(const Touched& touch, const Vec3& place, std::optional<Material>& room) noexcept {
+  return touch.facts->varies ? room.emplace(local_material(touch, place)) : touch.instance->material;
+}
+
+/// A sliding contact's force lies on the cone to within what the descent left; here exactly.
+Vec3 on_cone(const Vec3& force, const Vec3& normal, const Friction& friction, bool sliding) noexcept {
+  if (friction.still <= 0.0) return force;
+  const double push = std::max(0.0, force.dot(normal));
+  const Vec3 along = force - push * normal;
+  const double length = along.norm();
+  const double most = (sliding ? friction.sliding : friction.still) * push;
+  return length <= most ? force : Vec3(push * normal + (most / length) * along);
+}
+
+/// Adds consistent shading's lateral force as far as its budget goes: against the motion it is free and fills the
+/// budget, along the motion it spends it.
+void add_turn(ShadingMemory& memory, LawForce& law, const Vec3& moved) noexcept {
+  constexpr double full_budget = 1e-6;  // J from which on nothing is held back
+  constexpr double changeover = 0.1;    // cosine between force and motion over which the two cases blend
+  memory.budget -= memory.turned.dot(moved);
+  memory.turned = Vec3::Zero();
+  if (!law.contact || law.turn.isZero()) return;
+  const double size = law.turn.norm() * moved.norm();
+  const double cosine = size > 0.0 ? law.turn.dot(moved) / size : 0.0;
+  const double along = std::clamp(0.5 + 0.5 * cosine / changeover, 0.0, 1.0);
+  const double budget = std::clamp(memory.budget / full_budget, 0.0, 1.0);
+  const double giving = along * along * (3.0 - 2.0 * along);
+  memory.turned = (1.0 + giving * (budget - 1.0)) * law.turn;
+  law.force += memory.turned;
+}
+
+/// One surface touched by a point, or by a ball where the surface has one level further out for it. False, and nothing
+/// done, where more than one plane of a mesh may hold it.
+template <SurfaceView View>
+bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
+  constexpr bool triangles = std::is_same_v<View, TriangleView>;
+  const Instance& instance = *touch.instance;
+  OfSurface& surface = touch.contact->surface;
+  const Vec3& position = tick.probe.pose.position;
+  const double radius = tick.scene.probe_radius();
+  const Vec3 from = touch.to_local(tick.state.proxy);
+  // Friction is that of the place where the proxy rests.
+  const Vec3& place = surface.rests && touch.facts->volume ? surface.places[0].at : from;
+  std::optional<Material> room;
+  const Friction friction = friction_of(touch, material_there(touch, place, room));
+  const bool rested = surface.rests;
+  const bool slid = surface.sliding;
+  PointProxy<View> point(view, instance.sides, friction, touch.to_local(position), surface);
+  const PointRest rest = point.run(from);
+  if (!rest.simple) {
+    surface.rests = rested;
+    surface.sliding = slid;
+    return false;
+  }
+  tick.converged = rest.converged;
+  tick.felt = tick.state.proxy = position;
+  Part& part = *tick.parts.emplace_back();
+  part.touch = &touch;
+  part.stiffness = instance.material.stiffness;
+  if (!rest.contact) return true;
+  const Vec3 foot = rest.proxy - radius * rest.normal;
+  const Material& material = material_there(touch, foot, room);
+  part.stiffness = material.stiffness;
+  LawForce& law = part.law;
+  law.contact = true;
+  law.normal = touch.turned(rest.normal);
+  tick.felt = tick.state.proxy = touch.to_world(rest.proxy);
+  if constexpr (triangles) tick.state.proxy += view.skin() * law.normal;
+  Vec3 spring = tick.felt - position;
+  if constexpr (triangles) {
+    // Without friction a plane pushes along its normal alone; what friction holds is the proxy itself, skin and all.
+    spring = friction.still > 0.0 ? Vec3(tick.state.proxy - position) : Vec3(spring.dot(law.normal) * law.normal);
+  }
+  law.penetration = spring.norm();
+  law.pulls = rest.pulls;
+  law.force = material.stiffness * spring;
+  law.point = tick.felt - radius * law.normal;
+  if constexpr (requires { view.element(point.place(), point.spot()); }) {
+    law.element = view.element(point.place(), point.spot());
+  } else {
+    law.element = element_at(instance, view.level, foot, *touch.cache);
+  }
+  surface.places[0].element = law.element;
+  if constexpr (triangles) {
+    surface.height = point.place().side() * view.skin();
+    if (const auto* shading = std::get_if<ForceShadingLaw>(&instance.law))
+      shade(touch, *shading, {foot, rest.normal, 0.0, law.element, point.place().at}, law);
+  }
+  // Of the bare mesh under it, should the scene take the coat away.
+  if constexpr (std::is_same_v<View, ReliefView>) surface.height = point.place().side() * view.surface().base().skin();
+  if (!rest.pulls) {
+    law.force = with_damping(on_cone(law.force, law.normal, friction, surface.sliding), law.normal,
+                             tick.probe.twist.linear, material.damping);
+  }
+  if (std::holds_alternative<ForceShadingLaw>(instance.law))
+    add_turn(touch.contact->memory<ShadingMemory>(), law, position - tick.state.previous_probe);
+  if constexpr (requires { view.height(point.spot()); }) law.height = view.height(point.spot());
+  if constexpr (requires { view.bend(point.place(), point.spot()); }) {
+    if (instance.fine != nullptr) {
+      law.bends = true;
+      law.bend = point.place().side() * view.bend(point.place(), point.spot());
+      if (!touch.at_origin) {
+        const Mat3 turn = touch.pose->orientation.toRotationMatrix();
+        law.bend = turn * law.bend * turn.transpose();
+      }
+    }
+  }
+  return true;
+}
+
+/// Several surfaces, triangles, or a ball.
+void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
+  ProxyState& state = tick.state;
+  const Vec3& position = tick.probe.pose.position;
+  JointSolve joint(tick.scene.probe_radius(), patches);
+  const Vec3 before = state.proxy;
+  Vec3 from = before;
+  bool rubs = false;
+  bool smooth = false;
+  for (Touched& touch : tick.touches) {
+    if (!touch.facts->constrains) continue;
+    OfSurface& surface = touch.contact->surface;
+    joint.add(touch);
+    rubs = rubs || touch.facts->rubs;
+    if (!touch.facts->smooth) continue;
+    smooth = true;
+    // A little off the surface that a point was held on: from there a ball may roll.
+    if (surface.rests)
+      from +=
+          2.0 * on_view(touch.view, [](const auto& view) { return view.skin(); }) * touch.pose->rotate(surface.normal);
+    surface.rests = false;
+  }
+  bool clear = false;
+  if (smooth && tick.surfaces_moved) from = joint.pushed_out(from, clear);
+  const auto friction_in = [&](std::uint32_t owner) {
+    const Touched& touch = joint.touch(owner);
+    std::optional<Material> room;
+    return friction_of(touch, material_there(touch, touch.to_local(before), room));
+  };
+  Vec3 goal = position;
+  ConstraintSolution solution;
+  if (rubs) {
+    solution = joint.solve_with_friction(from, position, state.sliding, goal, friction_in);
+  } else {
+    state.sliding = false;
+    solution = joint.solve(from, goal);
+  }
+  state.proxy = solution.proxy;
+  tick.converged = solution.converged && joint.complete();
+  // While friction holds it, the proxy is where it is, not where the goal would have it.
+  const bool settled = solution.converged && solution.projection.feasible;
+  tick.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
+  for (std::size_t i = 0; i < joint.size(); ++i) {
+    Touched& touch = joint.touch(i);
+    std::optional<Material> room;
+    const Material& material = material_there(touch, touch.to_local(solution.proxy), room);
+    Part& part = *tick.parts.emplace_back();
+    part = {&touch, owner_force(touch, material, i, solution, goal, tick.probe), material.stiffness};
+    if (std::holds_alternative<ForceShadingLaw>(touch.instance->law))
+      add_turn(touch.contact->memory<ShadingMemory>(), part.law, position - state.previous_probe);
+    joint.remember_places(i, solution);
+    // One plane of one mesh: from there a point goes on by itself.
+    OfSurface& surface = touch.contact->surface;
+    surface.rests = joint.size() == 1 && !touch.facts->smooth && !touch.facts->by_planes &&
+                    tick.scene.probe_radius() == 0.0 && surface.places.size() == 1 &&
+                    TriangleView::within_face(surface.places[0]);
+    surface.sliding = state.sliding;
+  }
+}
+
+[[gnu::noinline]] void constrain_with_facets(Tick& tick) noexcept {
+  GeneratedPatches patches;
+  constrain_jointly(tick, &patches);
+}
+
+/// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
+void limit_energy(Tick& tick) noexcept {
+  ProxyState& state = tick.state;
+  const Vec3& probe = tick.probe.pose.position;
+  double stiffness = 0.0;
+  double strongest = 0.0;
+  for (const Part& part : tick.parts) {
+    if (!part.law.contact || part.law.penetration < strongest) continue;
+    strongest = part.law.penetration;
+    stiffness = part.stiffness;
+  }
+  if (stiffness > 0.0 && state.stiffness > 0.0) {
+    constexpr double rounding = 1e-9;
+    const double may = 0.5 * state.stiffness * (tick.held - probe).squaredNorm();
+    const double would = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
+    if (would > may * (1.0 + rounding)) {
+      const double paid = state.tank.pay(would - may);
+      if (paid < would - may) {
+        const double share = (may + paid) / would;
+        // Never all of it: a spring that is still held is not a free one.
+        stiffness *= std::max(share, 1e-12);
+        tick.limited = true;
+        tick.proxy_share = share;
+        for (Part& part : tick.parts) part.law.force *= share;
+      }
+    } else {
+      state.tank.fill(may - would);
+    }
+  }
+  state.stiffness = stiffness;
+}
+
+}  // namespace
+
+void constrain(Tick& tick) noexcept {
+  Touched* last = nullptr;
+  std::size_t count = 0;
+  bool facets = false;
+  for (Touched& touch : tick.touches) {
+    if (!touch.facts->constrains) continue;
+    ++count;
+    last = &touch;
+    facets = facets || touch.facts->facets;
+  }
+  if (count == 0) {
+    tick.state.proxy = tick.felt = tick.probe.pose.position;
+    tick.state.stiffness = 0.0;
+    return;
+  }
+  const bool point =
+      tick.scene.probe_radius() == 0.0 || (last->facts->volume && ball_level(*last->instance, tick.scene) > 0.0);
+  // What several planes of a mesh held, they mostly hold on.
+  const bool alone = count == 1 && point && !last->facts->by_planes &&
+                     (last->facts->smooth || last->contact->surface.places.size() <= 1);
+  if (alone) tick.state.sliding = last->contact->surface.sliding;
+  if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick); })) {
+    if (facets) {
+      constrain_with_facets(tick);
+    } else {
+      constrain_jointly(tick, nullptr);
+    }
+  }
+  limit_energy(tick);
+}
+
+}  // namespace asperity

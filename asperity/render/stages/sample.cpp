@@ -1,0 +1,136 @@
+#include <cmath>
+
+#include "asperity/render/stages/tick.h"
+
+namespace asperity {
+
+namespace {
+
+/// A probe of the workspace as it is in the scene.
+ProbeSample in_scene(const View& view, const ProbeSample& probe) noexcept {
+  ProbeSample out = probe;
+  out.pose.position = view.to_scene(probe.pose.position);
+  out.pose.orientation = view.orientation * probe.pose.orientation;
+  out.twist.linear = view.orientation * probe.twist.linear / view.zoom;
+  out.twist.angular = view.orientation * probe.twist.angular;
+  return out;
+}
+
+bool same(const View& a, const View& b) noexcept {
+  return a.zoom == b.zoom && a.focus == b.focus && a.home == b.home && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
+/// Takes the state from the view of the last tick to this one. The spring and the forces stay what they are to the
+/// hand: `held` becomes where the proxy would have to be for that.
+void adopt_view(const View& view, Tick& tick) noexcept {
+  ProxyState& state = tick.state;
+  const View last = state.view;
+  state.view = view;
+  if (same(last, view)) return;
+  const Vec3& now = tick.workspace.pose.position;
+  const auto turn = [&](const Vec3& v) { return Vec3(view.orientation * (last.orientation.conjugate() * v)); };
+  const double scale = last.zoom / view.zoom;
+  tick.held = view.to_scene(now) + scale * turn(state.proxy - last.to_scene(now));
+  state.stiffness /= scale * scale;
+  state.force = turn(state.force) / scale;
+  state.residual = turn(state.residual) / scale;
+  state.previous_probe = view.to_scene(state.workspace_probe);
+  for (Contact& contact : state.contacts) {
+    const auto turned = [&](const Vec3& v) { return contact.pose.rotate_inverse(turn(contact.pose.rotate(v))); };
+    contact.law.friction.stretch = scale * turned(contact.law.friction.stretch);
+    contact.law.friction.stiffness /= scale * scale;
+    contact.law.texture.force = turned(contact.law.texture.force) / scale;
+    contact.law.texture.penetration *= scale;
+    const Vec3 previous = contact.pose.apply_inverse(state.previous_probe);
+    if (auto* shading = std::get_if<ShadingMemory>(&contact.law.memory))
+      shading->turned = turn(shading->turned) / scale;
+    if (auto* potential = std::get_if<PotentialMemory>(&contact.law.memory)) potential->stiffness /= scale * scale;
+    if (auto* crossing = std::get_if<CrossingMemory>(&contact.law.memory)) crossing->previous = previous;
+    if (auto* point = std::get_if<ContactPointMemory>(&contact.law.memory)) point->previous = previous;
+  }
+}
+
+/// Whether what a law remembers means something on another surface.
+bool outlives_surface(const LawMemory& memory) noexcept {
+  return std::visit(
+      []<class Memory>(const Memory&) {
+        if constexpr (requires { Memory::of_surface; }) {
+          return !Memory::of_surface;
+        } else {
+          return true;
+        }
+      },
+      memory);
+}
+
+/// What a contact is in another scene: what is of the law goes on with the law, what is of the surface with the
+/// surface. False: nothing of it does.
+bool adopt(Contact& contact, const Instance& instance) noexcept {
+  const bool same_law = contact.law.index == instance.law.index();
+  const bool same_surface = contact.surface.identity == surface_identity(instance.surface);
+  const bool volume = iso_of(instance.surface) != nullptr;
+  // A proxy finds its surface again by itself; a law without one has come in from the front, and goes on pushing on the
+  // same volume by another law, or by the same law in another volume.
+  const bool pushed = contact.touching && !constrains(instance.law);
+  if (volume ? !same_surface && !(same_law && pushed) : !same_law) return false;
+  if (volume && same_law && same_surface) return true;
+  if (volume) {
+    contact.seen_outside = contact.seen_outside || contact.touching;
+    contact.touching = contact.asked = false;
+    contact.surface.rests = false;
+    contact.surface.places.clear();
+    contact.surface.normal = Vec3::Zero();
+  }
+  if (!same_surface) {
+    contact.surface = {};
+    if (!outlives_surface(contact.law.memory)) contact.law.memory = {};
+  }
+  if (!same_law) contact.law = {};
+  return true;
+}
+
+}  // namespace
+
+bool is_place(const ProbeSample& probe) noexcept {
+  // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
+  constexpr double farthest = 1e6;
+  const Vec3& place = probe.pose.position;
+  if (!(std::abs(place.x()) < farthest && std::abs(place.y()) < farthest && std::abs(place.z()) < farthest))
+    return false;
+  // 0 times a number is 0; times an infinity or no number it is none.
+  return (0.0 * probe.pose.orientation.coeffs()).sum() + (0.0 * probe.twist.linear).sum() +
+             (0.0 * probe.twist.angular).sum() + 0.0 * probe.time.count() ==
+         0.0;
+}
+
+bool sample(Tick& tick) noexcept {
+  ProxyState& state = tick.state;
+  if (!is_place(tick.workspace)) {
+    tick.out.flags.set(TickFlag::input_not_finite);
+    tick.out.proxy = state.proxy;
+    return false;
+  }
+  const View& view = tick.scene.settings().view;
+  tick.direct = view.identity();
+  tick.probe = tick.direct ? tick.workspace : in_scene(view, tick.workspace);
+  tick.first = state.epoch == 0;
+  if (tick.first) {
+    state.proxy = state.previous_probe = tick.probe.pose.position;
+    state.workspace_probe = tick.workspace.pose.position;
+    state.view = view;
+  }
+  tick.changed = state.epoch != tick.scene.epoch();
+  tick.held = state.proxy;
+  if (tick.changed) {
+    if (!tick.first) adopt_view(view, tick);
+    for (std::size_t i = state.contacts.size(); i-- > 0;) {
+      Contact& contact = state.contacts[i];
+      const auto felt = tick.scene.felt();
+      if (contact.instance >= felt.size() || !adopt(contact, felt[contact.instance])) state.contacts.swap_remove(i);
+    }
+  }
+  state.epoch = tick.scene.epoch();
+  return true;
+}
+
+}  // namespace asperity

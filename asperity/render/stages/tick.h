@@ -1,0 +1,74 @@
+#pragma once
+// One tick, from stage to stage: everything that a stage finds out is here for the next, and for a debugger.
+
+#include "asperity/render/felt.h"
+#include "asperity/render/laws/forces.h"
+#include "asperity/render/scene.h"
+#include "asperity/render/state.h"
+
+namespace asperity {
+
+/// What one touched instance answers, world frame.
+struct Part {
+  Touched* touch = nullptr;
+  LawForce law;
+  double stiffness = 0.0;  ///< N/m, where it is touched
+};
+
+/// One tick. [servo]
+struct Tick {
+  Tick(const Scene& in, ProxyState& of, ProxyCache& with, const ProbeSample& told, Seconds since,
+       ForceSample& answered) noexcept
+      : scene(in), state(of), cache(with), workspace(told), dt(since), out(answered) {}
+
+  const Scene& scene;
+  ProxyState& state;
+  ProxyCache& cache;
+  const ProbeSample& workspace;  ///< the probe as the device tells it
+  Seconds dt;
+
+  // sample
+  ProbeSample probe;         ///< in the scene
+  bool direct = true;        ///< the scene is the workspace
+  bool first = false;        ///< of the state
+  bool changed = false;      ///< another scene than at the last tick
+  Vec3 held = Vec3::Zero();  ///< where the proxy was, before a change of the scene moved it: what its spring held
+
+  // reach
+  FixedVector<Touched, most_contacts> touches;
+  FixedVector<Pose, most_contacts> earlier;  ///< of the last tick, of instances that may have moved since
+  int level = 0;                             ///< of volumes
+
+  // carry
+  bool surfaces_moved = false;  ///< a surface has moved and may have come into the proxy
+
+  // constrain
+  FixedVector<Part, most_contacts> parts;
+  Vec3 felt = Vec3::Zero();  ///< the proxy to be shown: without skins
+  double proxy_share = 1.0;  ///< of the proxy's spring that is rendered, where its energy was limited
+  bool converged = true;
+  bool limited = false;  ///< less was rendered than there would have been, for want of energy
+
+  // add
+  ForceSample& out;
+  double strongest = -1.0;  ///< N, of the contacts so far
+};
+
+/// Whether a sample is a place at all. [servo]
+bool is_place(const ProbeSample& probe) noexcept;
+/// Takes the probe into the scene and the state into the scene's snapshot. False where the sample is no place. [servo]
+bool sample(Tick& tick) noexcept;
+/// Finds the instances that the tick's motion can reach. [servo]
+void reach(Tick& tick) noexcept;
+/// Tells where they are now and what is felt of them, and takes the proxy along with what has moved. [servo]
+void carry(Tick& tick) noexcept;
+/// Leads the proxy to where they stop it: the laws that move the proxy. [servo]
+void constrain(Tick& tick) noexcept;
+/// Sums up: the proxy's force with friction and texture, the laws without a proxy, attraction, field effects. [servo]
+void add(Tick& tick) noexcept;
+/// On which side of the surfaces that may move the probe is, for the next `carry`. [servo]
+void remember_sides(Tick& tick) noexcept;
+/// Hands the force over from the last scene's, tells what is to be told, and remembers. [servo]
+void answer(Tick& tick) noexcept;
+
+}  // namespace asperity

@@ -1,0 +1,186 @@
+#pragma once
+// What one probe carries from tick to tick, and what it may forget at any time.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <type_traits>
+#include <variant>
+
+#include "asperity/core/fixed_vector.h"
+#include "asperity/core/frames.h"
+#include "asperity/core/place.h"
+#include "asperity/material/friction.h"
+#include "asperity/render/energy/tank.h"
+#include "asperity/render/laws.h"
+#include "asperity/render/view.h"
+#include "asperity/surface/view.h"
+
+namespace asperity {
+
+// --- what laws remember ---
+// Each type says by `of_surface` whether it means something on another surface that the same law is felt on.
+
+/// A law whose force is the slope of an energy: height-field, mesostructure.
+struct PotentialMemory {
+  static constexpr bool of_surface = false;
+  std::optional<double> potential;  ///< J, held at the last tick
+  double share = 1.0;               ///< of the force that is rendered: less where a change was not paid for
+  double stiffness = 0.0;           ///< N/m that it pushed with at the last tick
+};
+
+/// Consistent force shading.
+struct ShadingMemory {
+  static constexpr bool of_surface = false;
+  Vec3 turned = Vec3::Zero();  ///< its lateral force of the last tick (N, world)
+  double budget = 0.0;         ///< J: what that has taken from the hand and not yet given back
+};
+
+/// Cross-uncross. The point crossed and the gradient saved there are the contact's place and normal.
+struct CrossingMemory {
+  static constexpr bool of_surface = true;
+  Vec3 previous = Vec3::Zero();  ///< the probe at the last tick (m, object frame)
+  double value = 0.0;            ///< of the field there
+  bool crossed = false;          ///< the flag of the paper
+};
+
+/// Virtual contact point and magnet. The contact point and the direction of its push are the contact's place and
+/// normal.
+struct ContactPointMemory {
+  static constexpr bool of_surface = true;
+  Vec3 previous = Vec3::Zero();  ///< the probe at the last tick (m, object frame)
+  double stiffness = 0.0;        ///< felt (N/m); 0 in free space
+  double budget = 0.0;           ///< J that may be given back where the local stiffness rises
+  bool pushed = false;           ///< at the last tick
+};
+
+/// A law that a program has added.
+struct CustomMemory {
+  static constexpr bool of_surface = false;
+  std::uint64_t law = 0;  ///< that it belongs to; 0: none
+  std::array<std::byte, 64> bytes{};
+};
+
+using LawMemory =
+    std::variant<std::monostate, PotentialMemory, ShadingMemory, CrossingMemory, ContactPointMemory, CustomMemory>;
+
+// --- what a contact remembers, by what it belongs to ---
+
+/// What one probe remembers of a texture that it touches.
+struct TextureState {
+  bool held = false;           ///< the next three are of the last tick
+  Vec3 force = Vec3::Zero();   ///< of the relief (N, object frame)
+  double potential = 0.0;      ///< of the relief (J)
+  double penetration = 0.0;    ///< to the relief (m); below 0 over a valley
+  double book = 0.0;           ///< J: what it has taken beyond what its potential holds; below 0: given
+  Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last
+};
+
+/// Of the law: goes on while the instance is felt by the same one.
+struct OfLaw {
+  std::size_t index = std::variant_npos;  ///< in Law
+  LawMemory memory;
+  FrictionState friction;  ///< of the friction law, where it is not within the proxy (object frame)
+  TextureState texture;
+};
+
+/// Of the surface: goes on while its mesh, its field or its formula does.
+struct OfSurface {
+  std::uint64_t identity = 0;    ///< of that (surface_identity); 0: of none
+  FixedVector<Place, 3> places;  ///< where it was touched or nearest at the last tick
+  Vec3 normal = Vec3::Zero();    ///< unit, at the first of them on the side touched (object frame)
+  double height = 0.0;           ///< on triangles: of the proxy over the first of them (m)
+  // Of an isosurface, felt now: on the way to the scene's own.
+  double threshold = 0.0;
+  int level = 0;
+  bool rests = false;    ///< a point's proxy is at the first place
+  bool sliding = false;  ///< friction was overcome there at the last tick
+};
+
+/// What one probe remembers of one instance between ticks.
+struct Contact {
+  std::uint32_t instance = no_index;
+  bool touching = false;      ///< pushed, or held the proxy, at the last tick
+  bool placed = false;        ///< `pose` is of the last tick
+  bool moved = false;         ///< the instance has changed under the probe since the tick before the last
+  bool asked = false;         ///< law without a proxy: what was before the first tick in reach is known
+  bool seen_outside = false;  ///< the same: being inside now means having come in from the front
+  /// Of a surface that changes: whether the free probe was on the front of it.
+  std::optional<bool> outside;
+  Pose pose;                           ///< of the instance at the last tick
+  std::optional<double> detail_level;  ///< of the coat, felt at the last tick
+  double attraction = infinity;        ///< J: potential of what draws the probe, at the last tick; infinity: not known
+  double debt = 0.0;                   ///< J: what that owes; it rests until that is paid
+  OfSurface surface;
+  OfLaw law;
+
+  /// The place that the proxy rests on, or was nearest to. [servo]
+  [[nodiscard]] Place first() const noexcept { return surface.places.empty() ? Place{} : surface.places[0]; }
+  void put(const Place& place) noexcept {
+    surface.places.clear();
+    surface.places.push_back(place);
+  }
+  /// What the instance's law remembers, made anew where it is another one's. [servo]
+  template <class Memory>
+  Memory& memory() noexcept {
+    if (Memory* held = std::get_if<Memory>(&law.memory)) return *held;
+    return law.memory.emplace<Memory>();
+  }
+};
+static_assert(std::is_trivially_copyable_v<PotentialMemory> && sizeof(Contact) < 480);
+
+/// Instances that one probe feels at once.
+inline constexpr std::size_t most_contacts = 8;
+
+/// All that a probe carries from tick to tick. Copying it never allocates; assigning `ProxyState{}` resets it. One per
+/// probe.
+struct ProxyState {
+  Vec3 proxy = Vec3::Zero();  ///< m, world; rests one skin above what it touches
+  std::uint64_t epoch = 0;    ///< of the scene it belongs to; 0: no tick yet
+  FixedVector<Contact, most_contacts> contacts;
+  Vec3 previous_probe = Vec3::Zero();  ///< m, world, of the last tick
+  Seconds previous_time{0.0};
+  /// Of the spring between probe and proxy: what a tick may hold at most, and what changes of the scene may spend.
+  EnergyTank tank;
+  double stiffness = 0.0;               ///< N/m of that spring as rendered at the last tick; 0: free
+  Vec3 force = Vec3::Zero();            ///< N, scene: answered at the last tick
+  Vec3 residual = Vec3::Zero();         ///< N, scene: what is left of the force before the last change of the scene
+  Vec3 workspace_probe = Vec3::Zero();  ///< m: the probe at the last tick, before the view
+  View view;                            ///< of the last tick
+  bool sliding = false;                 ///< several surfaces at once: friction was overcome at the last tick
+  /// Level at which volumes larger than memory are felt: -1, the finest that is in memory; 0 or more, this one, as a
+  /// replay does after having it fetched.
+  int wanted_level = -1;
+};
+static_assert(sizeof(ProxyState) < 4500);
+
+/// What a tick may remember of surfaces to be quick. Nothing in it changes an answer: it may be shared between probes
+/// of one thread, dropped or replaced at any tick.
+class ProxyCache {
+ public:
+  /// That of an instance, or the one that was not asked for longest. [servo]
+  SurfaceCache& of(std::uint32_t instance) noexcept {
+    Entry* oldest = &entries_[0];
+    for (Entry& entry : entries_) {
+      if (entry.instance == instance) {
+        entry.used = ++clock_;
+        return entry.cache;
+      }
+      if (entry.used < oldest->used) oldest = &entry;
+    }
+    oldest->instance = instance;
+    oldest->used = ++clock_;
+    return oldest->cache;
+  }
+
+ private:
+  struct Entry {
+    std::uint32_t instance = no_index;
+    std::uint64_t used = 0;
+    SurfaceCache cache;
+  };
+  std::array<Entry, most_contacts> entries_;
+  std::uint64_t clock_ = 0;
+};
+
+}  // namespace asperity
