@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/brick_file.h"
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/brick/file.h"
+#include "asperity/field/volume/generators.h"
 #include "asperity/render/step.h"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "asperity/geometry/generators.h"
-#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/relief/surface.h"
 #include "bench/rows.h"
 #include "bench/slide.h"
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <numbers>
 
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/step.h"
 #include "bench/rows.h"

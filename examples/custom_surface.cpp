@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "apps/asperity/program.h"
-#include "asperity/surface/custom_surface.h"
+#include "asperity/surface/custom/surface.h"
 
 using namespace asperity;
 

@@ -9,7 +9,7 @@
 #include <iostream>
 
 #include "asperity/core/units.h"
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/sparse_io.h"
 

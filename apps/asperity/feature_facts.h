@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "asperity/field/roughness.h"
+#include "asperity/field/height/roughness.h"
 #include "asperity/io/experiment.h"
 #include "asperity/io/texture_waves.h"
 

@@ -14,7 +14,7 @@
 #include "apps/asperity/run.h"
 #include "asperity/core/math.h"
 #include "asperity/core/units.h"
-#include "asperity/field/mesostructure_library.h"
+#include "asperity/field/mesostructure/library.h"
 #include "asperity/io/atomic_file.h"
 #include "asperity/io/image_io.h"
 

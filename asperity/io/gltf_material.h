@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "asperity/core/result.h"
-#include "asperity/field/height_map.h"
-#include "asperity/field/image.h"
-#include "asperity/field/normal_map.h"
+#include "asperity/field/height/image.h"
+#include "asperity/field/height/map.h"
+#include "asperity/field/height/normal_map.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/io/mesh_io.h"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "asperity/core/result.h"
-#include "asperity/field/height_map.h"
-#include "asperity/field/image.h"
+#include "asperity/field/height/image.h"
+#include "asperity/field/height/map.h"
 
 namespace asperity {
 

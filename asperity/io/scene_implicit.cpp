@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/field/material_brush.h"
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
+#include "asperity/field/volume/material_brush.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/render/law_registry.h"
-#include "asperity/surface/implicit_texture.h"
+#include "asperity/surface/implicit/texture.h"
 
 namespace asperity {
 namespace {

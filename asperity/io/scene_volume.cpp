@@ -7,8 +7,8 @@
 #include <cmath>
 #include <optional>
 
-#include "asperity/field/derived_fields.h"
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/volume/derived_fields.h"
+#include "asperity/field/volume/generators.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/volume_io.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "asperity/core/progress.h"
-#include "asperity/field/sparse_grid.h"
+#include "asperity/field/volume/sparse_grid.h"
 
 namespace asperity {
 

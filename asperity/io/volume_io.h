@@ -11,7 +11,7 @@
 
 #include "asperity/core/progress.h"
 #include "asperity/core/result.h"
-#include "asperity/field/scalar_grid.h"
+#include "asperity/field/volume/scalar_grid.h"
 
 namespace asperity {
 

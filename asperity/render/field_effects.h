@@ -8,7 +8,7 @@
 
 #include "asperity/core/frames.h"
 #include "asperity/core/result.h"
-#include "asperity/field/scalar_field.h"
+#include "asperity/field/volume/scalar_field.h"
 #include "asperity/render/laws.h"
 
 namespace asperity {

@@ -11,12 +11,12 @@
 #include "asperity/render/fine/features.h"
 #include "asperity/render/laws.h"
 #include "asperity/render/view.h"
-#include "asperity/surface/closing.h"
-#include "asperity/surface/custom_view.h"
-#include "asperity/surface/implicit_surface.h"
-#include "asperity/surface/mesh_view.h"
-#include "asperity/surface/parametric_view.h"
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/custom/view.h"
+#include "asperity/surface/implicit/surface.h"
+#include "asperity/surface/mesh/view.h"
+#include "asperity/surface/parametric/view.h"
+#include "asperity/surface/relief/closing.h"
+#include "asperity/surface/relief/view.h"
 
 namespace asperity {
 

@@ -10,7 +10,7 @@
 #include "asperity/render/contact/fine.h"
 #include "asperity/render/law_registry.h"
 #include "asperity/render/local_material.h"
-#include "asperity/surface/relief_mesh.h"
+#include "asperity/surface/relief/mesh.h"
 
 namespace asperity {
 

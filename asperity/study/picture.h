@@ -9,7 +9,7 @@
 #include "asperity/core/result.h"
 #include "asperity/core/trace_record.h"
 #include "asperity/device/stroke.h"
-#include "asperity/field/image.h"
+#include "asperity/field/height/image.h"
 #include "asperity/render/scene.h"
 
 namespace asperity {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "asperity/core/result.h"
-#include "asperity/field/height_map.h"
-#include "asperity/field/surface_features.h"
+#include "asperity/field/height/map.h"
+#include "asperity/field/height/surface_features.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/surface/coat.h"
 

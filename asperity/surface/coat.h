@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "asperity/core/result.h"
-#include "asperity/field/mesostructure.h"
-#include "asperity/field/solid_mesostructure.h"
+#include "asperity/field/mesostructure/mesostructure.h"
+#include "asperity/field/mesostructure/solid.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/surface/material_maps.h"
 #include "asperity/surface/stitching.h"

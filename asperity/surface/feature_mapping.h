@@ -7,7 +7,7 @@
 #include "asperity/core/formulation.h"
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
-#include "asperity/field/surface_features.h"
+#include "asperity/field/height/surface_features.h"
 #include "asperity/geometry/mesh.h"
 
 namespace asperity {

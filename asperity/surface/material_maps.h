@@ -7,7 +7,7 @@
 
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
-#include "asperity/field/height_map.h"
+#include "asperity/field/height/map.h"
 
 namespace asperity {
 

@@ -4,12 +4,12 @@
 #include <concepts>
 
 #include "asperity/core/place.h"
-#include "asperity/field/cell_polynomial.h"
-#include "asperity/field/sparse_grid.h"
+#include "asperity/field/volume/cell_polynomial.h"
+#include "asperity/field/volume/sparse_grid.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/triangle_patch.h"
-#include "asperity/surface/flat_frame.h"
-#include "asperity/surface/relief_frame.h"
+#include "asperity/surface/mesh/flat_frame.h"
+#include "asperity/surface/relief/frame.h"
 
 namespace asperity {
 

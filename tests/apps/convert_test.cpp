@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "asperity/field/brick_store.h"
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/brick/store.h"
+#include "asperity/field/volume/generators.h"
 
 namespace asperity::convert_test {
 namespace {

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "asperity/field/mesostructure_library.h"
+#include "asperity/field/mesostructure/library.h"
 #include "asperity/io/image_io.h"
 
 namespace asperity::library_test {

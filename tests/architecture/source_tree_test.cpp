@@ -17,7 +17,7 @@ TEST(SourceTree, ReadsIncludesAndModules) {
   EXPECT_EQ(included("#include \"asperity/core/math.h\""), "\"asperity/core/math.h\"");
   EXPECT_EQ(included("# include <png.h>  // pictures"), "<png.h>");
   EXPECT_EQ(included("// #include <png.h>"), "");
-  EXPECT_EQ(module_of("asperity/field/image.h"), "field");
+  EXPECT_EQ(module_of("asperity/field/height/image.h"), "field");
   EXPECT_EQ(module_of("apps/asperity/run.h"), "");
 }
 

@@ -1,6 +1,6 @@
 // Bricked files: what is written is what is read, coarser levels against a plain smoothing, damage and bad input.
 
-#include "asperity/field/brick_file.h"
+#include "asperity/field/brick/file.h"
 
 #include <sys/resource.h>
 #include <sys/stat.h>

@@ -13,8 +13,8 @@
 #include <string>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/brick_file.h"
-#include "asperity/field/brick_store.h"
+#include "asperity/field/brick/file.h"
+#include "asperity/field/brick/store.h"
 
 namespace asperity {
 

@@ -1,6 +1,6 @@
 // The resident set of a bricked volume: readers that never wait, and always see right values.
 
-#include "asperity/field/brick_store.h"
+#include "asperity/field/brick/store.h"
 
 #include <atomic>
 #include <chrono>

@@ -1,6 +1,6 @@
 // Derived fields (row M-1): order of convergence on stretched axes, exactness on polynomials, holes, bad input.
 
-#include "asperity/field/derived_fields.h"
+#include "asperity/field/volume/derived_fields.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -9,7 +9,7 @@
 #include <functional>
 #include <numbers>
 
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/volume/generators.h"
 
 namespace asperity::derived_fields_test {
 namespace {

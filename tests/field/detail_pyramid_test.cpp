@@ -1,4 +1,4 @@
-#include "asperity/field/detail_pyramid.h"
+#include "asperity/field/height/detail_pyramid.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

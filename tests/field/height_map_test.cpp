@@ -1,4 +1,4 @@
-#include "asperity/field/height_map.h"
+#include "asperity/field/height/map.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

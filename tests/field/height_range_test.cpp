@@ -1,4 +1,4 @@
-#include "asperity/field/height_range.h"
+#include "asperity/field/height/range.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/height_map.h"
+#include "asperity/field/height/map.h"
 
 namespace asperity::height_range_test {
 namespace {

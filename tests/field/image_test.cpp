@@ -1,4 +1,4 @@
-#include "asperity/field/image.h"
+#include "asperity/field/height/image.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "asperity/field/material_brush.h"
+#include "asperity/field/volume/material_brush.h"
 
 #include <gtest/gtest.h>
 

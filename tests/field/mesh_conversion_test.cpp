@@ -1,7 +1,7 @@
 // What convert_mesh makes of a voxeliser's answer. The voxelisers here are made up; OpenVDB's is tested with it
 // (tests/io/vdb).
 
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 
 #include <gtest/gtest.h>
 

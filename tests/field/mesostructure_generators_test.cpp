@@ -1,4 +1,4 @@
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 
 #include <gtest/gtest.h>
 

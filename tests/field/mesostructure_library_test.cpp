@@ -1,4 +1,4 @@
-#include "asperity/field/mesostructure_library.h"
+#include "asperity/field/mesostructure/library.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "asperity/field/height_map.h"
+#include "asperity/field/height/map.h"
 
 namespace asperity::mesostructure_library_test {
 namespace {

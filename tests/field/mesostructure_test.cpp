@@ -1,4 +1,4 @@
-#include "asperity/field/mesostructure.h"
+#include "asperity/field/mesostructure/mesostructure.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 
 namespace asperity::mesostructure_test {
 namespace {

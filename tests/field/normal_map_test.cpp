@@ -1,4 +1,4 @@
-#include "asperity/field/normal_map.h"
+#include "asperity/field/height/normal_map.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "asperity/field/roughness.h"
+#include "asperity/field/height/roughness.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "asperity/field/scalar_field.h"
+#include "asperity/field/volume/scalar_field.h"
 
 #include <gtest/gtest.h>
 

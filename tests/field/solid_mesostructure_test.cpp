@@ -1,4 +1,4 @@
-#include "asperity/field/solid_mesostructure.h"
+#include "asperity/field/mesostructure/solid.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

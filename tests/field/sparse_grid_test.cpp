@@ -1,10 +1,10 @@
-#include "asperity/field/sparse_grid.h"
+#include "asperity/field/volume/sparse_grid.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "asperity/field/scalar_field.h"
+#include "asperity/field/volume/scalar_field.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/field/volumes.h"
 

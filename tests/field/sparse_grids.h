@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "asperity/field/sparse_grid.h"
+#include "asperity/field/volume/sparse_grid.h"
 
 namespace asperity::test {
 

@@ -1,4 +1,4 @@
-#include "asperity/field/surface_features.h"
+#include "asperity/field/height/surface_features.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,6 +1,6 @@
 // Built-in volumes: against their formulas, the cavity flow against its own exact slopes, bad members.
 
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/volume/generators.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "asperity/field/scalar_field.h"
+#include "asperity/field/volume/scalar_field.h"
 
 namespace asperity::test {
 

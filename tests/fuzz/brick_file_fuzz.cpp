@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <iterator>
 
-#include "asperity/field/brick_file.h"
-#include "asperity/field/brick_store.h"
+#include "asperity/field/brick/file.h"
+#include "asperity/field/brick/store.h"
 #include "tests/fuzz/fuzz_driver.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <memory>
 
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 #include "tests/fuzz/fuzz_driver.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/render/law_registry.h"
 #include "tests/io/experiment_fixture.h"
 

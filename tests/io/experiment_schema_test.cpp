@@ -13,8 +13,8 @@
 #include <valijson/validation_results.hpp>
 #include <valijson/validator.hpp>
 
-#include "asperity/field/brick_file.h"
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/brick/file.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/detail/scene_json.h"
 #include "asperity/io/gltf_material.h"
 #include "asperity/io/sparse_io.h"

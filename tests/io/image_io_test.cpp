@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/mesostructure.h"
+#include "asperity/field/mesostructure/mesostructure.h"
 
 namespace asperity::image_io_test {
 namespace {

@@ -1,6 +1,6 @@
 // Implicit surfaces and the laws that are felt on them in scene files.
 
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/sparse_io.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/io/experiment_fixture.h"

@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "asperity/field/derived_fields.h"
-#include "asperity/field/mesh_conversion.h"
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/conversion/mesh_conversion.h"
+#include "asperity/field/volume/derived_fields.h"
+#include "asperity/field/volume/generators.h"
 #include "asperity/io/experiment.h"
 #include "asperity/io/volume_io.h"
-#include "asperity/surface/implicit_texture.h"
+#include "asperity/surface/implicit/texture.h"
 
 namespace asperity::names_schema_test {
 namespace {

@@ -3,9 +3,9 @@
 #include <bit>
 #include <cstring>
 
-#include "asperity/field/brick_file.h"
-#include "asperity/field/derived_fields.h"
-#include "asperity/field/volume_generators.h"
+#include "asperity/field/brick/file.h"
+#include "asperity/field/volume/derived_fields.h"
+#include "asperity/field/volume/generators.h"
 #include "asperity/io/volume_io.h"
 #include "tests/io/experiment_fixture.h"
 

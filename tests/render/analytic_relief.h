@@ -6,7 +6,7 @@
 #include <memory>
 #include <numbers>
 
-#include "asperity/surface/relief_atlas.h"
+#include "asperity/surface/relief/atlas.h"
 #include "tests/render/fixtures.h"
 
 namespace asperity::test {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "asperity/surface/implicit_texture.h"
+#include "asperity/surface/implicit/texture.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/render/fixtures.h"
 

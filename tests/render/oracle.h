@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/surface/relief_mesh.h"
+#include "asperity/surface/relief/mesh.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::test {

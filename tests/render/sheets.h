@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "asperity/field/detail_pyramid.h"
+#include "asperity/field/height/detail_pyramid.h"
 #include "tests/render/fixtures.h"
 #include "tests/surface/reliefs.h"
 

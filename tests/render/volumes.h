@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/iso/surface.h"
 
 namespace asperity::volumes {
 

@@ -8,7 +8,7 @@
 
 #include "asperity/device/simulated_device.h"
 #include "asperity/servo/session.h"
-#include "asperity/surface/closing.h"
+#include "asperity/surface/relief/closing.h"
 #include "tests/render/fixtures.h"
 #include "tests/surface/folded.h"
 

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/io/image_io.h"
 #include "asperity/study/renderability.h"

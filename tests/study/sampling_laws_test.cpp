@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 
 namespace asperity::sampling_laws_test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "asperity/core/trace_record.h"
 #include "asperity/device/stroke.h"
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/scene.h"
 #include "asperity/render/step.h"

@@ -1,13 +1,13 @@
 // Closing of concave folds: formulation D4 and T7, hrm-2010 4.2.
 
-#include "asperity/surface/closing.h"
+#include "asperity/surface/relief/closing.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "asperity/surface/mesh_view.h"
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/mesh/view.h"
+#include "asperity/surface/relief/view.h"
 #include "tests/surface/folded.h"
 
 namespace asperity::closing_test {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/field/image.h"
+#include "asperity/field/height/image.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::coat_test {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "asperity/core/rng.h"
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
-#include "asperity/surface/relief_surface.h"
+#include "asperity/surface/relief/surface.h"
 
 namespace asperity::test {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "asperity/surface/custom_surface.h"
+#include "asperity/surface/custom/surface.h"
 
 namespace asperity::test {
 

@@ -1,11 +1,11 @@
 // Surfaces of one's own against formulas, parametric surfaces, and plain sampling of the field.
 
-#include "asperity/surface/custom_view.h"
+#include "asperity/surface/custom/view.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/surface/parametric_view.h"
+#include "asperity/surface/parametric/view.h"
 #include "tests/surface/balls.h"
 #include "tests/surface/custom_fields.h"
 

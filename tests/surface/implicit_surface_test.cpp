@@ -1,4 +1,4 @@
-#include "asperity/surface/implicit_surface.h"
+#include "asperity/surface/implicit/surface.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "asperity/surface/implicit_texture.h"
+#include "asperity/surface/implicit/texture.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 
 #include "asperity/core/rng.h"
-#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/iso/surface.h"
 #include "tests/field/sparse_grids.h"
 
 namespace asperity::implicit_texture_test {

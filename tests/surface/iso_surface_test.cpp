@@ -1,4 +1,4 @@
-#include "asperity/surface/iso_surface.h"
+#include "asperity/surface/iso/surface.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "asperity/surface/mesh_surface.h"
+#include "asperity/surface/mesh/surface.h"
 
 #include <gtest/gtest.h>
 

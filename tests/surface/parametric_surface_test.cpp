@@ -1,6 +1,6 @@
 // Parametric surfaces: derivatives, and queries against formulas and against dense sampling.
 
-#include "asperity/surface/parametric_view.h"
+#include "asperity/surface/parametric/view.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

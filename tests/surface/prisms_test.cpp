@@ -1,4 +1,4 @@
-#include "asperity/surface/prisms.h"
+#include "asperity/surface/relief/prisms.h"
 
 #include <gtest/gtest.h>
 

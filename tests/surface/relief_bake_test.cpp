@@ -1,6 +1,6 @@
 // Formulas baked onto meshes: the heights are the formula's roots on the shell's rays, and what has none is told.
 
-#include "asperity/surface/relief_bake.h"
+#include "asperity/surface/relief/bake.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
 // A relief as plain geometry: as closed as its base, on the relief, and nearer to it the finer it is.
 
-#include "asperity/surface/relief_mesh.h"
+#include "asperity/surface/relief/mesh.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::relief_mesh_test {

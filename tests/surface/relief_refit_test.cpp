@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::relief_refit_test {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 #include "tests/surface/balls.h"
 #include "tests/surface/reliefs.h"
 

@@ -1,4 +1,4 @@
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 
 #include <gtest/gtest.h>
 

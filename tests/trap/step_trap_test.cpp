@@ -12,8 +12,8 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "asperity/field/detail_pyramid.h"
-#include "asperity/field/mesostructure_generators.h"
+#include "asperity/field/height/detail_pyramid.h"
+#include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"

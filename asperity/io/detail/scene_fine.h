@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "asperity/device/stroke.h"
-#include "asperity/field/mesostructure.h"
+#include "asperity/field/mesostructure/mesostructure.h"
 #include "asperity/io/detail/scene_reader.h"
 
 namespace asperity {

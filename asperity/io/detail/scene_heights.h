@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "asperity/field/height_map.h"
-#include "asperity/field/mesostructure_generators.h"
-#include "asperity/field/mesostructure_library.h"
+#include "asperity/field/height/map.h"
+#include "asperity/field/mesostructure/generators.h"
+#include "asperity/field/mesostructure/library.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/image_io.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/sparse_io.h"
 
 namespace asperity::vdb_io {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <new>
 
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/vdb/vdb_library.h"
 
 namespace asperity::vdb_io {

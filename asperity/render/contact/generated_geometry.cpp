@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/surface/relief_mesh.h"
+#include "asperity/surface/relief/mesh.h"
 
 namespace asperity {
 

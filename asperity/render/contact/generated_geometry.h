@@ -5,7 +5,7 @@
 #include "asperity/core/fixed_vector.h"
 #include "asperity/geometry/triangle_contact.h"
 #include "asperity/render/laws.h"
-#include "asperity/surface/relief_view.h"
+#include "asperity/surface/relief/view.h"
 
 namespace asperity {
 

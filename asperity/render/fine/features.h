@@ -10,8 +10,8 @@
 #include "asperity/core/formulation.h"
 #include "asperity/core/result.h"
 #include "asperity/core/units.h"
-#include "asperity/field/height_map.h"
-#include "asperity/field/surface_features.h"
+#include "asperity/field/height/map.h"
+#include "asperity/field/height/surface_features.h"
 #include "asperity/surface/feature_mapping.h"
 
 namespace asperity {

@@ -11,7 +11,7 @@
 #include <numbers>
 #include <string>
 
-#include "asperity/field/mesh_conversion.h"
+#include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/vdb/vdb.h"

@@ -6,7 +6,7 @@
 
 #include <cstdlib>
 
-#include "asperity/field/derived_fields.h"
+#include "asperity/field/volume/derived_fields.h"
 #include "tests/io/vtk/vtk_files.h"
 
 namespace asperity::real_files_test {

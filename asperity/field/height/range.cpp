@@ -1,0 +1,364 @@
+#include "asperity/field/height/range.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "asperity/core/math.h"
+#include "asperity/field/height/detail/texel_coordinate.h"
+
+namespace asperity {
+namespace {
+
+// A rectangle on up to so many texels a side is bounded by control points of just its piece, a larger one by up to so
+// many blocks: for a square five to eight a side.
+constexpr int most_texels = 6;
+constexpr std::size_t most_blocks = 64;
+
+/// The whole number at or below a coordinate.
+double period_of(double s) noexcept {
+  if (!(std::abs(s) < 0x1p31)) [[unlikely]] {
+    return std::floor(s);
+  }
+  const double towards_zero = static_cast<double>(static_cast<std::int64_t>(s));
+  return towards_zero > s ? towards_zero - 1.0 : towards_zero;
+}
+
+// ---- control points of a small rectangle ------------------------------------------------
+
+/// Control points along one axis, two more than texels: the reconstruction keeps between the least and the greatest.
+/// Two are on the first texel, two on the last, one on each between, which is that texel's stored value; the two in the
+/// middle of a single texel are one. This is where the outer four lie: at b + before (a - b) + after (c - b), where b
+/// is the value of their texel and a, c are those of its neighbours.
+struct EndControls {
+  double before[4];
+  double after[4];
+  [[nodiscard]] double point(int i, double a, double b, double c) const noexcept {
+    return b + before[i] * (a - b) + after[i] * (c - b);
+  }
+};
+
+/// The spline's blossom in a texel: linear in both u and v (texels from its centre), its height where they agree.
+void place_blossom(EndControls& ends, int i, double u, double v) noexcept {
+  ends.before[i] = 0.5 * (0.5 - u) * (0.5 - v);
+  ends.after[i] = 0.5 * (0.5 + u) * (0.5 + v);
+}
+
+void place_linear(EndControls& ends, int i, double u) noexcept {
+  ends.before[i] = std::max(0.0, -u);
+  ends.after[i] = std::max(0.0, u);
+}
+
+EndControls end_controls(const TexelSpan& span, Reconstruction reconstruction) noexcept {
+  const double leaves_first = span.count == 1 ? span.to : 0.5;
+  const double enters_last = span.count == 1 ? span.from : -0.5;
+  EndControls ends;
+  switch (reconstruction) {
+    case Reconstruction::quadratic_bspline:
+      // From x to y, across the knots k1 ... kn between texels, the spline keeps within the polygon of its blossoms at
+      // (x, x), (x, k1), (k1, k2), ... (kn, y), (y, y); those of two knots are its coefficients.
+      place_blossom(ends, 0, span.from, span.from);
+      place_blossom(ends, 1, span.from, leaves_first);
+      place_blossom(ends, 2, enters_last, span.to);
+      place_blossom(ends, 3, span.to, span.to);
+      break;
+    case Reconstruction::bilinear:
+      // The ends, and the creases in between: texel centres.
+      place_linear(ends, 0, span.from);
+      place_linear(ends, 1, std::max(span.from, std::min(leaves_first, 0.0)));
+      place_linear(ends, 2, std::min(span.to, std::max(enters_last, 0.0)));
+      place_linear(ends, 3, span.to);
+      break;
+    case Reconstruction::nearest:
+      for (int i = 0; i < 4; ++i) place_linear(ends, i, 0.0);
+      break;
+  }
+  return ends;
+}
+
+/// Where texel `i` - 1 of a span is stored along its axis. The apron serves for the span's neighbours beyond the
+/// border; a span that runs over it goes on at texel 0.
+std::size_t place(const TexelSpan& span, std::size_t i, int texels) noexcept {
+  const int at = span.first + static_cast<int>(i);
+  return static_cast<std::size_t>(at <= texels + 1 ? at : at - texels);
+}
+
+/// The control points of one row from its stored values, in their place; the last is repeated up to the width.
+template <std::size_t width>
+void make_points(double (&row)[width], std::size_t last, const EndControls& ends) noexcept {
+  const double* end = row + last - 2;
+  const double points[4] = {ends.point(0, row[0], row[1], row[2]), ends.point(1, row[0], row[1], row[2]),
+                            ends.point(2, end[0], end[1], end[2]), ends.point(3, end[0], end[1], end[2])};
+  row[0] = points[0];
+  row[1] = points[1];
+  row[last - 1] = points[2];
+  for (std::size_t x = last; x < width; ++x) row[x] = points[3];
+}
+
+/// Bounds of all control points from those of each row, by making them along the columns too.
+template <std::size_t width>
+HeightRange range_of_points(const double (&rows)[width][width], std::size_t last, const EndControls& ends) noexcept {
+  double lowest[width];
+  double highest[width];
+  const auto include = [&](std::size_t x, double point) {
+    lowest[x] = std::min(lowest[x], point);
+    highest[x] = std::max(highest[x], point);
+  };
+  std::fill(lowest, lowest + width, infinity);
+  std::fill(highest, highest + width, -infinity);
+  const auto* end = rows + last - 2;
+  for (int i = 0; i < 2; ++i) {
+    for (std::size_t x = 0; x < width; ++x) include(x, ends.point(i, rows[0][x], rows[1][x], rows[2][x]));
+    for (std::size_t x = 0; x < width; ++x) include(x, ends.point(i + 2, end[0][x], end[1][x], end[2][x]));
+  }
+  for (std::size_t y = 2; y + 1 < last; ++y) {
+    for (std::size_t x = 0; x < width; ++x) include(x, rows[y][x]);
+  }
+  return {*std::min_element(lowest, lowest + width), *std::max_element(highest, highest + width)};
+}
+
+/// Bounds over a rectangle on up to `width` - 2 texels a side: a width known to the compiler saves half of the time.
+template <std::size_t width>
+HeightRange piece_range(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) noexcept {
+  const EndControls across = end_controls(s, texels.reconstruction);
+  const EndControls along = end_controls(t, texels.reconstruction);
+  const std::size_t last_x = width == 3 ? 2 : static_cast<std::size_t>(s.count) + 1;
+  const std::size_t last_y = width == 3 ? 2 : static_cast<std::size_t>(t.count) + 1;
+  std::size_t columns[width];
+  for (std::size_t x = 0; x < width; ++x) columns[x] = place(s, std::min(x, last_x), texels.width);
+  double rows[width][width];
+  for (std::size_t y = 0; y <= last_y; ++y) {
+    const float* stored = texels.values + place(t, y, texels.height) * (static_cast<std::size_t>(texels.width) + 2);
+    for (std::size_t x = 0; x < width; ++x) rows[y][x] = stored[columns[x]];
+    make_points(rows[y], last_x, across);
+  }
+  return range_of_points(rows, last_y, along);
+}
+
+HeightRange piece_range(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) noexcept {
+  const int longer_side = std::max(s.count, t.count);
+  if (longer_side == 1) return piece_range<3>(texels, s, t);
+  if (longer_side == 2) return piece_range<4>(texels, s, t);
+  return piece_range<most_texels + 2>(texels, s, t);
+}
+
+// ---- blocks -----------------------------------------------------------------------------
+
+float rounded_down(double value) noexcept {
+  const float near = static_cast<float>(value);
+  // The relative part is one to two units in the last place; the other one steps where that underflows.
+  return static_cast<double>(near) > value ? near - (std::abs(near) * 0x1p-23F + 0x1p-149F) : near;
+}
+
+float rounded_up(double value) noexcept {
+  return -rounded_down(-value);
+}
+
+/// Bounds of each column's elements.
+class BoundsRow {
+ public:
+  explicit BoundsRow(std::size_t columns) : lowest_(columns, infinity), highest_(columns, -infinity) {}
+  void set(std::size_t x, double lowest, double highest) {
+    lowest_[x] = lowest;
+    highest_[x] = highest;
+  }
+  void include(const BoundsRow& row) {
+    for (std::size_t x = 0; x < lowest_.size(); ++x) lowest_[x] = std::min(lowest_[x], row.lowest_[x]);
+    for (std::size_t x = 0; x < highest_.size(); ++x) highest_[x] = std::max(highest_[x], row.highest_[x]);
+  }
+  [[nodiscard]] HeightRange range(std::size_t begin, std::size_t end) const {
+    HeightRange range{lowest_[begin], highest_[begin]};
+    for (std::size_t x = begin + 1; x < end; ++x) {
+      range.lowest = std::min(range.lowest, lowest_[x]);
+      range.highest = std::max(range.highest, highest_[x]);
+    }
+    return range;
+  }
+
+ private:
+  std::vector<double> lowest_;
+  std::vector<double> highest_;
+};
+
+/// What a relief's bounds are put together from. Nearest: the texels. Otherwise the gaps, squares between four
+/// neighbouring texel centres, apron included: gap (x, y) is the one to the left of and below texel (x, y)'s centre.
+class Elements {
+ public:
+  explicit Elements(const StoredTexels& texels) : texels_(texels) {}
+  /// Whether a texel is bounded by its own element and the next to the right and above, which are its neighbours' too.
+  [[nodiscard]] bool shared_by_neighbours() const { return texels_.reconstruction != Reconstruction::nearest; }
+  [[nodiscard]] std::size_t columns() const { return count(texels_.width); }
+  [[nodiscard]] std::size_t rows() const { return count(texels_.height); }
+  void read_row(std::size_t y, BoundsRow& bounds) const {
+    const std::size_t stride = static_cast<std::size_t>(texels_.width) + 2;
+    const float* below = texels_.values + y * stride;
+    const float* above = below + stride;
+    switch (texels_.reconstruction) {
+      case Reconstruction::quadratic_bspline: return read_spline_gaps(below, above, bounds);
+      case Reconstruction::bilinear: return read_gaps(below, above, bounds);
+      case Reconstruction::nearest: break;
+    }
+    for (std::size_t x = 0; x < columns(); ++x) bounds.set(x, above[x + 1], above[x + 1]);
+  }
+
+ private:
+  [[nodiscard]] std::size_t count(int texels) const {
+    return static_cast<std::size_t>(texels) + (shared_by_neighbours() ? 1 : 0);
+  }
+  static void set_to_bounds(BoundsRow& bounds, std::size_t x, double a, double b, double c, double d) {
+    bounds.set(x, std::min(std::min(a, b), std::min(c, d)), std::max(std::max(a, b), std::max(c, d)));
+  }
+  void read_gaps(const float* below, const float* above, BoundsRow& bounds) const {
+    for (std::size_t x = 0; x < columns(); ++x)
+      set_to_bounds(bounds, x, below[x], below[x + 1], above[x], above[x + 1]);
+  }
+  /// The coefficients of the same spline on a grid twice as fine (Chaikin's rule, weights 3/4 and 1/4 along each axis),
+  /// four in each gap.
+  void read_spline_gaps(const float* below, const float* above, BoundsRow& bounds) const {
+    for (std::size_t x = 0; x < columns(); ++x) {
+      const double a = below[x];
+      const double b = below[x + 1];
+      const double c = above[x];
+      const double d = above[x + 1];
+      set_to_bounds(bounds, x, (9.0 * a + 3.0 * b + 3.0 * c + d) / 16.0, (3.0 * a + 9.0 * b + c + 3.0 * d) / 16.0,
+                    (3.0 * a + b + 9.0 * c + 3.0 * d) / 16.0, (a + 3.0 * b + 3.0 * c + 9.0 * d) / 16.0);
+    }
+  }
+  StoredTexels texels_;
+};
+
+/// The blocks of a level along an axis of `texels`.
+std::size_t blocks_along(int texels, unsigned level) noexcept {
+  return (static_cast<std::size_t>(texels - 1) >> level) + 1;
+}
+
+/// The blocks of a level along one axis that cover a span: one run, or two where the span goes over the border.
+struct BlockRuns {
+  std::size_t begin[2] = {0, 0};
+  std::size_t end[2] = {0, 0};
+  BlockRuns(const TexelSpan& span, int texels, unsigned level) noexcept {
+    const auto block = [level](int texel) { return static_cast<std::size_t>(texel) >> level; };
+    const int last = span.first + span.count - 1;
+    begin[0] = block(span.first);
+    end[0] = block(std::min(last, texels - 1)) + 1;
+    if (last >= texels) end[1] = block(last - texels) + 1;
+  }
+  [[nodiscard]] std::size_t count() const noexcept { return end[0] - begin[0] + end[1]; }
+};
+
+}  // namespace
+
+TexelSpan texels_under(double lower, double upper, int texels, Wrap wrap) noexcept {
+  const TexelPlace from = texel_under(unit_coordinate(lower, wrap), texels);
+  const TexelPlace to = texel_under(unit_coordinate(upper, wrap), texels);
+  // Coordinates within one period keep their order in unit_coordinate and texel_under, rounding included: the texels of
+  // all of them lie between those of the ends.
+  const double periods = wrap == Wrap::repeat ? period_of(upper) - period_of(lower) : 0.0;
+  if (periods == 0.0) return {from.index, to.index - from.index + 1, from.offset, to.offset};
+  if (periods == 1.0 && to.index < from.index) {
+    return {from.index, to.index + texels - from.index + 1, from.offset, to.offset};
+  }
+  return {0, texels, -0.5, 0.5};
+}
+
+RangePyramid::RangePyramid(const StoredTexels& texels) {
+  std::size_t count = 0;
+  std::size_t columns = 0;
+  std::size_t rows = 0;
+  do {
+    level_begin_.push_back(count);
+    const auto level = static_cast<unsigned>(level_begin_.size());
+    columns = blocks_along(texels.width, level);
+    rows = blocks_along(texels.height, level);
+    count += columns * rows;
+    // A span over the border may count its first block, which is its last too, twice.
+  } while ((columns + 1) * (rows + 1) > most_blocks);
+  level_begin_.shrink_to_fit();
+  blocks_.reserve(count);
+  build_first_level(texels);
+  for (unsigned level = 2; level <= level_begin_.size(); ++level) build_next_level(texels, level);
+}
+
+void RangePyramid::build_first_level(const StoredTexels& texels) {
+  const Elements elements(texels);
+  const std::size_t shared = elements.shared_by_neighbours() ? 1 : 0;
+  const std::size_t columns = blocks_along(texels.width, 1);
+  const std::size_t rows = blocks_along(texels.height, 1);
+  BoundsRow all(elements.columns());
+  BoundsRow sum(elements.columns());
+  BoundsRow next(elements.columns());
+  for (std::size_t y = 0; y < rows; ++y) {
+    // A shared row has been read for the blocks below.
+    if (y == 0 || shared == 0) elements.read_row(2 * y, next);
+    sum = next;
+    for (std::size_t row = 2 * y + 1; row < std::min(2 * y + 2 + shared, elements.rows()); ++row) {
+      elements.read_row(row, next);
+      sum.include(next);
+    }
+    all.include(sum);
+    for (std::size_t x = 0; x < columns; ++x) {
+      const HeightRange range = sum.range(2 * x, std::min(2 * x + 2 + shared, elements.columns()));
+      blocks_.push_back({rounded_down(range.lowest), rounded_up(range.highest)});
+    }
+  }
+  whole_ = all.range(0, elements.columns());
+}
+
+void RangePyramid::build_next_level(const StoredTexels& texels, unsigned level) {
+  const std::size_t columns = blocks_along(texels.width, level);
+  const std::size_t rows = blocks_along(texels.height, level);
+  const std::size_t finer_columns = blocks_along(texels.width, level - 1);
+  const std::size_t finer_rows = blocks_along(texels.height, level - 1);
+  for (std::size_t y = 0; y < rows; ++y) {
+    const Block* below = &blocks_[level_begin_[level - 2] + 2 * y * finer_columns];
+    const Block* above = 2 * y + 1 < finer_rows ? below + finer_columns : below;
+    for (std::size_t x = 0; x < columns; ++x) {
+      const std::size_t left = 2 * x;
+      const std::size_t right = std::min(left + 1, finer_columns - 1);
+      blocks_.push_back(
+          {std::min({below[left].lowest, below[right].lowest, above[left].lowest, above[right].lowest}),
+           std::max({below[left].highest, below[right].highest, above[left].highest, above[right].highest})});
+    }
+  }
+}
+
+std::size_t RangePyramid::memory_bytes() const noexcept {
+  return blocks_.capacity() * sizeof(Block) + level_begin_.capacity() * sizeof(std::size_t);
+}
+
+HeightRange RangePyramid::over(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) const noexcept {
+  const bool small = s.count <= most_texels && t.count <= most_texels;
+  return small ? piece_range(texels, s, t) : cover(texels, s, t);
+}
+
+HeightRange RangePyramid::cover(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) const noexcept {
+  // Below this level there are too many blocks for certain.
+  const std::uint64_t area = static_cast<std::uint64_t>(s.count) * static_cast<std::uint64_t>(t.count);
+  auto level = static_cast<unsigned>(std::max(1, static_cast<int>(std::bit_width(area / most_blocks)) / 2));
+  BlockRuns columns(s, texels.width, level);
+  BlockRuns rows(t, texels.height, level);
+  while (columns.count() * rows.count() > most_blocks) {
+    ++level;
+    columns = BlockRuns(s, texels.width, level);
+    rows = BlockRuns(t, texels.height, level);
+  }
+  const std::size_t stride = blocks_along(texels.width, level);
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -lowest;
+  for (int upper = 0; upper < 2; ++upper) {
+    for (std::size_t y = rows.begin[upper]; y < rows.end[upper]; ++y) {
+      const Block* row = &blocks_[level_begin_[level - 1] + y * stride];
+      for (int right = 0; right < 2; ++right) {
+        for (std::size_t x = columns.begin[right]; x < columns.end[right]; ++x) {
+          lowest = std::min(lowest, row[x].lowest);
+          highest = std::max(highest, row[x].highest);
+        }
+      }
+    }
+  }
+  return {lowest, highest};
+}
+
+}  // namespace asperity

@@ -1,0 +1,601 @@
+#include "asperity/field/volume/sparse_grid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/core/identity.h"
+
+namespace asperity {
+
+namespace {
+
+constexpr int block_side = SparseBlock::side;
+constexpr int apron_side = SparseGrid::brick_side;
+constexpr int material_side = block_side + 1;
+constexpr std::size_t material_points = material_side * material_side * material_side;
+constexpr std::size_t most_table = std::size_t{1} << 27;  // 4,096 voxels a side, some 2 GB
+
+/// Place of a point of a brick's apron, -1 … 9 along each axis.
+constexpr std::size_t apron_index(int i, int j, int k) noexcept {
+  return static_cast<std::size_t>(i + 1 + apron_side * (j + 1 + apron_side * (k + 1)));
+}
+
+Status check_material(const PointMaterial& m, const std::string& place) {
+  const auto good = [](float value, bool fits) { return std::isnan(value) || (std::isfinite(value) && fits); };
+  if (!good(m.stiffness, m.stiffness > 0.0F))
+    return bad_value(fmt::format("is {}", m.stiffness), place + ".stiffness", "above 0 (N/m)");
+  if (!good(m.damping, m.damping >= 0.0F))
+    return bad_value(fmt::format("is {}", m.damping), place + ".damping", "0 or more (N·s/m)");
+  if (!good(m.static_friction, m.static_friction >= 0.0F))
+    return bad_value(fmt::format("is {}", m.static_friction), place + ".static_friction", "0 or more");
+  if (!good(m.dynamic_friction, m.dynamic_friction >= 0.0F))
+    return bad_value(fmt::format("is {}", m.dynamic_friction), place + ".dynamic_friction", "0 or more");
+  if (!good(m.roughness, m.roughness >= 0.0F))
+    return bad_value(fmt::format("is {}", m.roughness), place + ".roughness", "0 or more");
+  return success();
+}
+
+Status check_block(const SparseBlock& block, std::size_t number) {
+  const std::string place = fmt::format("blocks[{}]", number);
+  for (const std::int32_t at : block.at) {
+    if (std::abs(static_cast<std::int64_t>(at)) > (1 << 24))
+      return bad_value(fmt::format("is at {}", at), place, "places within 16 million blocks of the origin");
+  }
+  for (std::size_t i = 0; i < block.value.size(); ++i) {
+    if (!std::isfinite(block.value[i]))
+      return bad_value("is not a finite number", fmt::format("{}.value[{}]", place, i), "distances (m)");
+  }
+  if (!block.face.empty() && block.face.size() != SparseBlock::points)
+    return bad_value(fmt::format("has {} entries", block.face.size()), place + ".face", "512 or none");
+  if (!block.material.empty() && block.material.size() != SparseBlock::points)
+    return bad_value(fmt::format("has {} entries", block.material.size()), place + ".material", "512 or none");
+  for (std::size_t i = 0; i < block.material.size(); ++i)
+    ASPERITY_CHECK(check_material(block.material[i], fmt::format("{}.material[{}]", place, i)));
+  return success();
+}
+
+Status check_source(const SparseSource& source) {
+  if (!(source.voxel > 0.0) || !std::isfinite(source.voxel))
+    return bad_value(fmt::format("is {}", source.voxel), "voxel", "a length above 0 (m)");
+  if (!source.origin.allFinite()) return bad_value("is not finite", "origin", "three finite lengths (m)");
+  if (!(source.outside > 0.0) || !std::isfinite(source.outside))
+    return bad_value(fmt::format("is {}", source.outside), "outside", "a length above 0 (m)");
+  if (!(source.inside < 0.0) || !std::isfinite(source.inside))
+    return bad_value(fmt::format("is {}", source.inside), "inside", "a length below 0 (m)");
+  if (source.blocks.empty()) return bad_value("holds none", "blocks", "at least one block");
+  if (source.blocks.size() > SparseGrid::most_bricks) {
+    return Error{ErrorCode::too_large,
+                 fmt::format("holds {} blocks", source.blocks.size()),
+                 {},
+                 "blocks",
+                 fmt::format("at most {}", SparseGrid::most_bricks)};
+  }
+  for (std::size_t b = 0; b < source.blocks.size(); ++b) ASPERITY_CHECK(check_block(source.blocks[b], b));
+  return success();
+}
+
+}  // namespace
+
+std::span<const char* const> material_channel_names() {
+  static constexpr const char* names[] = {"stiffness", "damping", "static_friction", "dynamic_friction", "roughness"};
+  return names;
+}
+
+/// Marks what is beyond the band as outside or inside: each connected part takes the side of the stored points that it
+/// touches.
+void SparseGrid::settle_signs(const std::vector<const SparseBlock*>& blocks) {
+  constexpr std::int32_t open = -3;
+  std::replace(table_.begin(), table_.end(), inside_entry, open);
+  const auto touching = [](const SparseBlock& block, std::size_t axis, bool low) {
+    double sum = 0.0;
+    for (int b = 0; b < block_side; ++b) {
+      for (int a = 0; a < block_side; ++a) {
+        int at[3] = {a, a, a};
+        at[axis] = low ? 0 : block_side - 1;
+        at[(axis + 1) % 3] = a;
+        at[(axis + 2) % 3] = b;
+        sum += static_cast<double>(block.value[SparseBlock::index(at[0], at[1], at[2])]);
+      }
+    }
+    return sum;
+  };
+  std::vector<std::size_t> part;
+  const std::size_t step[3] = {1, counts_[0], static_cast<std::size_t>(counts_[0]) * counts_[1]};
+  for (std::size_t seed = 0; seed < table_.size(); ++seed) {
+    if (table_[seed] != open) continue;
+    part.assign(1, seed);
+    table_[seed] = outside_entry;
+    double sum = 0.0;
+    for (std::size_t n = 0; n < part.size(); ++n) {
+      const std::size_t entry = part[n];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t here = entry / step[axis] % counts_[axis];
+        for (const bool up : {false, true}) {
+          if (up ? here + 1 >= counts_[axis] : here == 0) continue;
+          const std::size_t next = up ? entry + step[axis] : entry - step[axis];
+          if (table_[next] == open) {
+            table_[next] = outside_entry;
+            part.push_back(next);
+          } else if (blocks[next] != nullptr) {
+            sum += touching(*blocks[next], axis, up);
+          }
+        }
+      }
+    }
+    if (sum >= 0.0) continue;
+    for (const std::size_t entry : part) table_[entry] = inside_entry;
+  }
+}
+
+/// Makes the bricks of the wanted entries, aprons included.
+void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::vector<bool>& wanted) {
+  const auto step_y = static_cast<std::ptrdiff_t>(counts_[0]);
+  const std::ptrdiff_t step_z = step_y * static_cast<std::ptrdiff_t>(counts_[1]);
+  for (std::size_t entry = 0; entry < table_.size(); ++entry) {
+    if (!wanted[entry] || table_[entry] < 0) continue;
+    // A brick is never on the table's border, so that all its neighbours are entries.
+    const SparseBlock* around[3][3][3];
+    float beyond[3][3][3];
+    bool any_material = false;
+    for (int z = 0; z < 3; ++z) {
+      for (int y = 0; y < 3; ++y) {
+        for (int x = 0; x < 3; ++x) {
+          const auto at = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + (x - 1) + (y - 1) * step_y +
+                                                   (z - 1) * step_z);
+          around[z][y][x] = blocks[at];
+          beyond[z][y][x] = table_[at] < 0 ? constant(table_[at]) : 0.0F;
+          const bool reaches = x > 0 && y > 0 && z > 0;
+          any_material = any_material || (reaches && blocks[at] != nullptr && !blocks[at]->material.empty());
+        }
+      }
+    }
+    auto brick = std::make_shared<Brick>();
+    for (int k = -1; k <= block_side + 1; ++k) {
+      const int z = (k + block_side) / block_side;
+      for (int j = -1; j <= block_side + 1; ++j) {
+        const int y = (j + block_side) / block_side;
+        for (int i = -1; i <= block_side + 1; ++i) {
+          const int x = (i + block_side) / block_side;
+          const SparseBlock* from = around[z][y][x];
+          brick->value[apron_index(i, j, k)] =
+              from != nullptr ? from->value[SparseBlock::index(i - (x - 1) * block_side, j - (y - 1) * block_side,
+                                                               k - (z - 1) * block_side)]
+                              : beyond[z][y][x];
+        }
+      }
+    }
+    const SparseBlock& own = *around[1][1][1];
+    brick->face = own.face;
+    brick->owns_material = !own.material.empty();
+    if (any_material) {
+      brick->material.resize(material_points);
+      for (int k = 0; k < material_side; ++k) {
+        for (int j = 0; j < material_side; ++j) {
+          for (int i = 0; i < material_side; ++i) {
+            const SparseBlock* from = around[1 + k / block_side][1 + j / block_side][1 + i / block_side];
+            if (from == nullptr || from->material.empty()) continue;
+            brick->material[static_cast<std::size_t>(i + material_side * (j + material_side * k))] =
+                from->material[SparseBlock::index(i % block_side, j % block_side, k % block_side)];
+          }
+        }
+      }
+    }
+    bricks_[static_cast<std::size_t>(table_[entry])] = std::move(brick);
+  }
+}
+
+void SparseGrid::finish() {
+  identity_ = next_identity();
+  lowest_ = highest_ = bricks_.front()->value[apron_index(0, 0, 0)];
+  has_faces_ = true;
+  has_materials_ = false;
+  std::vector<ValueRange> ranges(table_.size());
+  for (std::uint32_t k = 0; k < counts_[2]; ++k) {
+    for (std::uint32_t j = 0; j < counts_[1]; ++j) {
+      for (std::uint32_t i = 0; i < counts_[0]; ++i) {
+        const std::size_t entry = table_index(i, j, k);
+        ValueRange& range = ranges[entry];
+        if (table_[entry] >= 0) {
+          const Brick& brick = *bricks_[static_cast<std::size_t>(table_[entry])];
+          for (const float value : brick.value) range.include({value, value});
+          has_faces_ = has_faces_ && !brick.face.empty();
+          has_materials_ = has_materials_ || brick.owns_material;
+          lowest_ = std::min(lowest_, range.lower);
+          highest_ = std::max(highest_, range.upper);
+          continue;
+        }
+        const float value = constant(table_[entry]);
+        range.include({value, value});
+        // Its outermost cells and their rings reach into stored neighbours.
+        bool lonely = true;
+        for (std::uint32_t z = k - std::min(k, 1U); z <= std::min(k + 1, counts_[2] - 1) && lonely; ++z) {
+          for (std::uint32_t y = j - std::min(j, 1U); y <= std::min(j + 1, counts_[1] - 1) && lonely; ++y) {
+            for (std::uint32_t x = i - std::min(i, 1U); x <= std::min(i + 1, counts_[0] - 1) && lonely; ++x)
+              lonely = table_[table_index(x, y, z)] < 0;
+          }
+        }
+        if (lonely) continue;
+        double samples[64];
+        for (const std::uint32_t z : {0U, 3U, 6U, 7U}) {
+          for (const std::uint32_t y : {0U, 3U, 6U, 7U}) {
+            for (const std::uint32_t x : {0U, 3U, 6U, 7U}) {
+              const std::uint32_t cell[3] = {block_side * i + x, block_side * j + y, block_side * k + z};
+              // Rings of four nodes from these cells on cover all that the brick's cells read at its border.
+              cell_samples(cell, 1, samples);
+              for (const double sample : samples)
+                range.include({static_cast<float>(sample), static_cast<float>(sample)});
+            }
+          }
+        }
+      }
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) extent_[static_cast<int>(a)] = static_cast<double>(brick_cells) * counts_[a];
+  octree_ = MinMaxOctree::build(counts_, brick_cells, std::move(ranges));
+}
+
+Result<SparseGrid> SparseGrid::build(SparseSource source) {
+  ASPERITY_CHECK(check_source(source));
+  SparseGrid grid;
+  grid.voxel_ = source.voxel;
+  grid.per_voxel_ = 1.0 / source.voxel;
+  grid.origin_ = source.origin;
+  grid.outside_ = source.outside;
+  grid.inside_ = source.inside;
+  std::array<std::int32_t, 3> last = source.blocks.front().at;
+  grid.first_ = last;
+  for (const SparseBlock& block : source.blocks) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      grid.first_[a] = std::min(grid.first_[a], block.at[a]);
+      last[a] = std::max(last[a], block.at[a]);
+    }
+  }
+  double entries = 1.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    // A ring of constant bricks around all.
+    grid.first_[a] -= 1;
+    grid.counts_[a] = static_cast<std::uint32_t>(last[a] - grid.first_[a] + 2);
+    entries *= grid.counts_[a];
+  }
+  if (entries > static_cast<double>(most_table)) {
+    return Error{ErrorCode::too_large,
+                 fmt::format("spans {} x {} x {} bricks", grid.counts_[0], grid.counts_[1], grid.counts_[2]),
+                 {},
+                 "blocks",
+                 fmt::format("at most {} in all", most_table)};
+  }
+  for (std::size_t a = 0; a < 3; ++a)
+    grid.lower_[static_cast<int>(a)] =
+        source.origin[static_cast<int>(a)] + source.voxel * static_cast<double>(block_side * grid.first_[a]);
+  grid.table_.assign(static_cast<std::size_t>(entries), inside_entry);
+  std::vector<const SparseBlock*> blocks(grid.table_.size(), nullptr);
+  for (std::size_t b = 0; b < source.blocks.size(); ++b) {
+    const SparseBlock& block = source.blocks[b];
+    const std::size_t entry = grid.table_index(static_cast<std::uint32_t>(block.at[0] - grid.first_[0]),
+                                               static_cast<std::uint32_t>(block.at[1] - grid.first_[1]),
+                                               static_cast<std::uint32_t>(block.at[2] - grid.first_[2]));
+    if (blocks[entry] != nullptr)
+      return bad_value("is at the place of an earlier one", fmt::format("blocks[{}]", b), "each block once");
+    blocks[entry] = &block;
+    grid.table_[entry] = static_cast<std::int32_t>(b);
+  }
+  grid.settle_signs(blocks);
+  grid.bricks_.resize(source.blocks.size());
+  grid.fill(blocks, std::vector<bool>(grid.table_.size(), true));
+  grid.finish();
+  return grid;
+}
+
+SparseBlock SparseGrid::block_of(std::size_t entry) const {
+  const Brick& brick = *bricks_[static_cast<std::size_t>(table_[entry])];
+  SparseBlock block;
+  block.at = {first_[0] + static_cast<std::int32_t>(entry % counts_[0]),
+              first_[1] + static_cast<std::int32_t>(entry / counts_[0] % counts_[1]),
+              first_[2] + static_cast<std::int32_t>(entry / counts_[0] / counts_[1])};
+  if (brick.owns_material) block.material.resize(SparseBlock::points);
+  for (int k = 0; k < block_side; ++k) {
+    for (int j = 0; j < block_side; ++j) {
+      for (int i = 0; i < block_side; ++i) {
+        const std::size_t at = SparseBlock::index(i, j, k);
+        block.value[at] = brick.value[apron_index(i, j, k)];
+        if (brick.owns_material)
+          block.material[at] = brick.material[static_cast<std::size_t>(i + material_side * (j + material_side * k))];
+      }
+    }
+  }
+  block.face = brick.face;
+  return block;
+}
+
+SparseSource SparseGrid::source() const {
+  SparseSource source;
+  source.voxel = voxel_;
+  source.origin = origin_;
+  source.outside = outside_;
+  source.inside = inside_;
+  source.blocks.reserve(bricks_.size());
+  for (std::size_t entry = 0; entry < table_.size(); ++entry) {
+    if (table_[entry] >= 0) source.blocks.push_back(block_of(entry));
+  }
+  return source;
+}
+
+Result<SparseGrid> SparseGrid::edited(std::vector<SparseBlock> changed) const {
+  SparseGrid grid = *this;
+  std::vector<const SparseBlock*> blocks(table_.size(), nullptr);
+  std::vector<bool> wanted(table_.size(), false);
+  const auto step_y = static_cast<std::ptrdiff_t>(counts_[0]);
+  const std::ptrdiff_t step_z = step_y * static_cast<std::ptrdiff_t>(counts_[1]);
+  const auto around = [&](std::size_t entry, const auto& visit) {
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x)
+          visit(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + x + y * step_y + z * step_z));
+      }
+    }
+  };
+  for (std::size_t b = 0; b < changed.size(); ++b) {
+    const SparseBlock& block = changed[b];
+    ASPERITY_CHECK(check_block(block, b));
+    std::size_t entry = 0;
+    bool here = true;
+    for (std::size_t a = 3; a-- > 0;) {
+      const std::int64_t at = static_cast<std::int64_t>(block.at[a]) - first_[a];
+      here = here && at >= 0 && at < static_cast<std::int64_t>(counts_[a]);
+      entry = entry * counts_[a] + static_cast<std::size_t>(here ? at : 0);
+    }
+    if (!here || table_[entry] < 0)
+      return bad_value("is not stored in the grid", fmt::format("blocks[{}]", b), "blocks of source()");
+    if (blocks[entry] != nullptr)
+      return bad_value("is at the place of an earlier one", fmt::format("blocks[{}]", b), "each block once");
+    blocks[entry] = &block;
+    around(entry, [&](std::size_t next) { wanted[next] = wanted[next] || table_[next] >= 0; });
+  }
+  // What the aprons read besides: the blocks around the concerned ones, as they are.
+  std::vector<std::size_t> needed;
+  std::vector<bool> listed(table_.size(), false);
+  for (std::size_t entry = 0; entry < table_.size(); ++entry) {
+    if (!wanted[entry]) continue;
+    around(entry, [&](std::size_t next) {
+      if (listed[next] || table_[next] < 0 || blocks[next] != nullptr) return;
+      listed[next] = true;
+      needed.push_back(next);
+    });
+  }
+  std::vector<SparseBlock> kept;
+  kept.reserve(needed.size());
+  for (const std::size_t entry : needed) {
+    kept.push_back(block_of(entry));
+    blocks[entry] = &kept.back();
+  }
+  grid.fill(blocks, wanted);
+  grid.finish();
+  return grid;
+}
+
+Box SparseGrid::bounds() const noexcept {
+  Box box;
+  box.lower = lower_;
+  for (std::size_t a = 0; a < 3; ++a)
+    box.upper[static_cast<int>(a)] = lower_[static_cast<int>(a)] + voxel_ * brick_cells * counts_[a];
+  return box;
+}
+
+std::size_t SparseGrid::memory_bytes() const noexcept {
+  std::size_t bytes = sizeof(*this) + table_.capacity() * sizeof(std::int32_t) + octree_.memory_bytes() +
+                      bricks_.capacity() * sizeof(bricks_[0]);
+  constexpr std::size_t control_block = 16;
+  for (const auto& brick : bricks_) {
+    bytes += sizeof(Brick) + control_block + brick->face.capacity() * sizeof(std::uint32_t) +
+             brick->material.capacity() * sizeof(PointMaterial);
+  }
+  return bytes;
+}
+
+std::size_t SparseGrid::dense_bytes() const noexcept {
+  std::size_t nodes = 1;
+  for (const std::uint32_t count : counts_) nodes *= static_cast<std::size_t>(count) * brick_cells + 1;
+  return nodes * (sizeof(float) + (has_faces_ ? sizeof(std::uint32_t) : 0));
+}
+
+void SparseGrid::cell_samples(const std::uint32_t cell[3], int ring, double* out) const noexcept {
+  int local[3];
+  std::uint32_t at[3];
+  bool border = false;
+  for (std::size_t a = 0; a < 3; ++a) {
+    at[a] = cell[a] / brick_cells;
+    local[a] = static_cast<int>(cell[a] % brick_cells);
+    border = border || local[a] < ring || local[a] + 1 + ring >= brick_cells;
+  }
+  const int count = 2 + 2 * ring;
+  const std::int32_t entry = table_[table_index(at[0], at[1], at[2])];
+  if (entry >= 0) {
+    const float* values = bricks_[static_cast<std::size_t>(entry)]->value;
+    for (int k = 0; k < count; ++k) {
+      for (int j = 0; j < count; ++j) {
+        const float* row = values + apron_index(local[0] - ring, local[1] - ring + j, local[2] - ring + k);
+        for (int i = 0; i < count; ++i) *out++ = static_cast<double>(row[i]);
+      }
+    }
+    return;
+  }
+  if (!border) {
+    std::fill(out, out + count * count * count, static_cast<double>(constant(entry)));
+    return;
+  }
+  // Beyond the band, beside it: node by node. Beyond the table lies what its border has.
+  const auto node = [&](std::size_t a, int offset) {
+    const std::int64_t last = static_cast<std::int64_t>(counts_[a]) * brick_cells - 1;
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(static_cast<std::int64_t>(cell[a]) + offset, 0, last));
+  };
+  for (int k = -ring; k < count - ring; ++k) {
+    const std::uint32_t z = node(2, k);
+    for (int j = -ring; j < count - ring; ++j) {
+      const std::uint32_t y = node(1, j);
+      for (int i = -ring; i < count - ring; ++i) {
+        const std::uint32_t x = node(0, i);
+        const std::int32_t there = table_[table_index(x / brick_cells, y / brick_cells, z / brick_cells)];
+        *out++ = static_cast<double>(
+            there < 0 ? constant(there)
+                      : bricks_[static_cast<std::size_t>(there)]
+                            ->value[apron_index(static_cast<int>(x % brick_cells), static_cast<int>(y % brick_cells),
+                                                static_cast<int>(z % brick_cells))]);
+      }
+    }
+  }
+}
+
+const SparseGrid::Brick* SparseGrid::locate(const Vec3& p, SparseHint& hint, Place& place) const noexcept {
+  const double x = (p.x() - lower_.x()) * per_voxel_;
+  const double y = (p.y() - lower_.y()) * per_voxel_;
+  const double z = (p.z() - lower_.z()) * per_voxel_;
+  // Also false for what is not a number.
+  if (!(x >= 0.0 && y >= 0.0 && z >= 0.0 && x < extent_.x() && y < extent_.y() && z < extent_.z())) {
+    hint.owner = 0;
+    return nullptr;
+  }
+  const auto i = static_cast<std::uint32_t>(static_cast<std::int32_t>(x));
+  const auto j = static_cast<std::uint32_t>(static_cast<std::int32_t>(y));
+  const auto k = static_cast<std::uint32_t>(static_cast<std::int32_t>(z));
+  place = {{i % brick_cells, j % brick_cells, k % brick_cells}, {x - i, y - j, z - k}};
+  const std::uint32_t at[3] = {i / brick_cells, j / brick_cells, k / brick_cells};
+  if (hint.owner != identity_ || hint.at[0] != at[0] || hint.at[1] != at[1] || hint.at[2] != at[2]) {
+    hint.owner = identity_;
+    std::copy(at, at + 3, hint.at);
+    const std::int32_t entry = table_[table_index(at[0], at[1], at[2])];
+    hint.brick = entry >= 0 ? bricks_[static_cast<std::size_t>(entry)].get() : nullptr;
+  }
+  return static_cast<const Brick*>(hint.brick);
+}
+
+namespace {
+
+/// Value and gradient of the trilinear interpolant of eight corners, x fastest.
+inline Potential interpolated(const double c[8], const double at[3], double per_voxel) noexcept {
+  const double u = at[0];
+  const double v = at[1];
+  const double w = at[2];
+  const double x00 = c[1] - c[0];
+  const double x10 = c[3] - c[2];
+  const double x01 = c[5] - c[4];
+  const double x11 = c[7] - c[6];
+  const double y0 = c[0] + u * x00;
+  const double y1 = c[2] + u * x10;
+  const double y2 = c[4] + u * x01;
+  const double y3 = c[6] + u * x11;
+  const double low = y0 + v * (y1 - y0);
+  const double high = y2 + v * (y3 - y2);
+  const double gx_low = x00 + v * (x10 - x00);
+  const double gx_high = x01 + v * (x11 - x01);
+  const double gy_low = y1 - y0;
+  Potential out;
+  out.value = low + w * (high - low);
+  out.gradient = Vec3(per_voxel * (gx_low + w * (gx_high - gx_low)), per_voxel * (gy_low + w * ((y3 - y2) - gy_low)),
+                      per_voxel * (high - low));
+  return out;
+}
+
+}  // namespace
+
+Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept {
+  Place place;
+  const Brick* brick = locate(p, hint, place);
+  double c[8];
+  if (brick != nullptr) {
+    const float* v = brick->value + apron_index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
+                                                static_cast<int>(place.cell[2]));
+    constexpr int y = apron_side;
+    constexpr int z = apron_side * apron_side;
+    const float corners[8] = {v[0], v[1], v[y], v[y + 1], v[z], v[z + 1], v[z + y], v[z + y + 1]};
+    for (int n = 0; n < 8; ++n) c[n] = static_cast<double>(corners[n]);
+  } else {
+    if (hint.owner == 0) return {outside_, Vec3::Zero()};
+    std::uint32_t cell[3];
+    cell_of(hint, place, cell);
+    cell_samples(cell, 0, c);
+  }
+  return interpolated(c, place.fraction, per_voxel_);
+}
+
+Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
+  Place place;
+  const Brick* brick = locate(p, hint, place);
+  double c[64];
+  if (brick != nullptr) {
+    for (int k = 0; k < 4; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        const float* row =
+            brick->value + apron_index(static_cast<int>(place.cell[0]) - 1, static_cast<int>(place.cell[1]) - 1 + j,
+                                       static_cast<int>(place.cell[2]) - 1 + k);
+        for (int i = 0; i < 4; ++i) c[i + 4 * (j + 4 * k)] = static_cast<double>(row[i]);
+      }
+    }
+  } else {
+    if (hint.owner == 0) return {outside_, Vec3::Zero()};
+    std::uint32_t cell[3];
+    cell_of(hint, place, cell);
+    cell_samples(cell, 1, c);
+  }
+  Potential out;
+  for (int n = 0; n < 8; ++n) {
+    const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
+    double weight = 1.0;
+    for (int a = 0; a < 3; ++a) {
+      const double f = place.fraction[a];
+      weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
+    }
+    out.value += weight * c[node];
+    out.gradient += (0.5 * weight * per_voxel_) *
+                    Vec3(c[node + 1] - c[node - 1], c[node + 4] - c[node - 4], c[node + 16] - c[node - 16]);
+  }
+  return out;
+}
+
+std::uint32_t SparseGrid::face(const Vec3& p, SparseHint& hint) const noexcept {
+  Place place;
+  // Half a voxel on, so that the cell's first node is the nearest one.
+  const Brick* brick = locate(p + Vec3::Constant(0.5 * voxel_), hint, place);
+  if (brick == nullptr || brick->face.empty()) return no_index;
+  return brick->face[SparseBlock::index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
+                                        static_cast<int>(place.cell[2]))];
+}
+
+PointMaterial SparseGrid::material(const Vec3& p, const PointMaterial& own, SparseHint& hint) const noexcept {
+  Place place;
+  const Brick* brick = locate(p, hint, place);
+  if (brick == nullptr || brick->material.empty()) return own;
+  // The eight points' weights, and what they store.
+  const PointMaterial* stored[8];
+  double weights[8];
+  for (int n = 0; n < 8; ++n) {
+    double weight = 1.0;
+    int node[3];
+    for (int a = 0; a < 3; ++a) {
+      const double f = place.fraction[a];
+      node[a] = static_cast<int>(place.cell[a]) + (n >> a & 1);
+      weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
+    }
+    weights[n] = weight;
+    stored[n] =
+        &brick->material[static_cast<std::size_t>(node[0] + material_side * (node[1] + material_side * node[2]))];
+  }
+  const auto mixed = [&](float PointMaterial::*channel) {
+    double sum = 0.0;
+    for (int n = 0; n < 8; ++n) {
+      const float value = stored[n]->*channel;
+      sum += weights[n] * static_cast<double>(std::isnan(value) ? own.*channel : value);
+    }
+    return static_cast<float>(sum);
+  };
+  PointMaterial out;
+  out.stiffness = mixed(&PointMaterial::stiffness);
+  out.damping = mixed(&PointMaterial::damping);
+  out.static_friction = mixed(&PointMaterial::static_friction);
+  out.dynamic_friction = mixed(&PointMaterial::dynamic_friction);
+  out.roughness = mixed(&PointMaterial::roughness);
+  return out;
+}
+
+}  // namespace asperity

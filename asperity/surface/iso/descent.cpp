@@ -1,0 +1,390 @@
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/core/fixed_vector.h"
+#include "asperity/surface/iso/surface.h"
+#include "asperity/surface/walk.h"
+
+namespace asperity {
+
+namespace {
+
+// Of the cell's narrowest width: a pull along the surface that is not worth following.
+constexpr double rest_of_cell = 2e-5;
+// From this near, of the same, one more step of Newton's method ends on the surface.
+constexpr double nearly_on_surface = 1e-5;
+// How near a face a point counts as on it, of the cell's width: nearer, a step to the face would be lost in rounding.
+constexpr double on_face = 1e-8;
+
+// A way that crosses a face by no more than this share of its length runs along the face: the rest is rounding.
+constexpr double along_face = 1e-9;
+
+/// The surface's own frame at a point, seen from one cell, and where the goal pulls the point in it.
+struct Pull {
+  bool known = false;
+  bool at_rest = false;
+  bool outside = false;  ///< the goal lies outside the tangent plane
+  CellIndex cell;
+  Vec3 normal = Vec3::Zero();  ///< unit, on the side touched; within the face, on a face
+  Vec3 step = Vec3::Zero();    ///< along the tangent plane
+  double drop = 0.0;           ///< how far the surface falls below the end of the step (m)
+  double rate = 0.0;           ///< length of the pull
+};
+
+class Leader {
+ public:
+  Leader(const IsoView& surface, const Goal& goal, double side, IsoSpot& spot) noexcept
+      : surface_(surface),
+        axes_(surface.field->axes(surface.level)),
+        goal_(goal),
+        sign_(side * surface.sigma),
+        x_(spot.point),
+        away_(spot.away) {}
+
+  DescentEnd run() noexcept {
+    while (moves_ < budget) {
+      if (const Step step = move(); step != Step::moved)
+        return step == Step::rest ? DescentEnd::rest : step == Step::left ? DescentEnd::left : DescentEnd::rim;
+    }
+    return DescentEnd::limited;
+  }
+  /// On the side touched; zero where nothing was found out.
+  [[nodiscard]] const Vec3& normal() const noexcept { return normal_; }
+
+ private:
+  enum class Step { moved, rest, left, rim };
+  static constexpr int budget = 400;  // evaluations
+
+  const CellPolynomial* load(const CellIndex& cell) noexcept {
+    CellPolynomial& slot = surface_.cells->slot(surface_.field->identity(), surface_.level, cell);
+    return surface_.field->load(surface_.level, cell, slot) ? &slot : nullptr;
+  }
+
+  /// The cells that x lies in or on the border of: `first` … `last` along each axis.
+  void find_cells() noexcept {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const GridAxis::Place place = axes_[a].locate(x_[static_cast<int>(a)]);
+      first_[a] = last_[a] = place.cell;
+      on_face_[a] = place.fraction <= on_face || place.fraction >= 1.0 - on_face;
+      if (place.fraction <= on_face) {
+        node_[a] = place.cell;
+        if (place.cell > 0) first_[a] = place.cell - 1;
+      } else if (on_face_[a]) {
+        node_[a] = place.cell + 1;
+        if (place.cell + 1 < axes_[a].cells()) last_[a] = place.cell + 1;
+      }
+    }
+  }
+
+  /// Normal and pull along the surface from the gradient of phi. False where there is no direction.
+  bool aim(const CellPolynomial& cell, Vec3 gradient, int face, Pull& pull, Vec3& s, double& depth,
+           double& length) const noexcept {
+    length = gradient.norm();
+    if (face >= 0) {
+      const double whole = length;
+      gradient[face] = 0.0;
+      length = gradient.norm();
+      if (!(length > 1e-6 * whole)) return false;
+    }
+    if (!(length > 0.0)) return false;
+    pull.known = true;
+    pull.normal = gradient / length;
+    pull.outside = (goal_.point - x_).dot(pull.normal) > 0.0;
+    const Vec3 goal = goal_.friction > 0.0 ? friction_goal(x_, pull.normal, goal_.point, goal_.friction) : goal_.point;
+    Vec3 v = goal - x_;
+    if (face >= 0) v[face] = 0.0;
+    depth = v.dot(pull.normal);
+    s = v - depth * pull.normal;
+    pull.rate = s.norm();
+    pull.at_rest = pull.rate <= rest_of_cell * cell.width.minCoeff();
+    return true;
+  }
+
+  /// Pull of the goal in one cell; within the face across `face`, where that is an axis.
+  Pull pull_in(const CellIndex& index, int face) noexcept {
+    Pull pull;
+    pull.cell = index;
+    const CellPolynomial* cell = load(index);
+    if (cell == nullptr) return pull;
+    // The projection that led here knows the gradient; within a cell the second derivatives change so little that those
+    // of the last move serve once more.
+    FieldJet jet;
+    if (face < 0 && arrived_ && arrived_cell_ == index) {
+      jet.gradient = arrived_gradient_;
+      jet.hessian = bend_;
+    } else {
+      ++moves_;
+      jet = cell->jet(x_);
+      bend_ = jet.hessian;
+      bend_cell_ = index;
+    }
+    Vec3 s;
+    double depth = 0.0;
+    double length = 0.0;
+    if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
+    // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
+    const Mat3 bend = (sign_ / length) * jet.hessian;
+    if (face >= 0) {
+      const Vec3 along = s / pull.rate;
+      const double a = 1.0 + depth * along.dot(bend * along);
+      pull.step = a > 0.05 ? Vec3(s / a) : s;
+    } else {
+      pull.step = tangent_step(pull.normal, s, depth, bend);
+    }
+    pull.drop = 0.5 * pull.step.dot(bend * pull.step);
+    return pull;
+  }
+
+  /// Whether a step from x leads into the cell, over the faces that x lies on other than `face`.
+  bool leads_into(const CellIndex& cell, const Vec3& step, int face) const noexcept {
+    const double noise = along_face * step.norm();
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!on_face_[a] || static_cast<int>(a) == face) continue;
+      const double d = step[static_cast<int>(a)];
+      if (cell.at[a] < node_[a] ? d > noise : d < -noise) return false;
+    }
+    return true;
+  }
+
+  Step move() noexcept {
+    find_cells();
+    if (!on_face_[0] && !on_face_[1] && !on_face_[2]) {
+      const Pull pull = pull_in({{first_[0], first_[1], first_[2]}}, -1);
+      if (!pull.known) return Step::rim;
+      normal_ = away_ = pull.normal;
+      if (goal_.may_leave && pull.outside) return Step::left;
+      return !pull.at_rest && follow(pull, -1) ? Step::moved : Step::rest;
+    }
+    FixedVector<Pull, 8> leads;
+    bool all_outside = true;
+    bool any = false;
+    bool rests = false;
+    Vec3 sum = Vec3::Zero();
+    for (std::uint32_t k = first_[2]; k <= last_[2]; ++k) {
+      for (std::uint32_t j = first_[1]; j <= last_[1]; ++j) {
+        for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) {
+          const Pull pull = pull_in({{i, j, k}}, -1);
+          if (!pull.known) continue;
+          if (!any) normal_ = pull.normal;
+          any = true;
+          sum += pull.normal;
+          all_outside = all_outside && pull.outside;
+          if (pull.at_rest) {
+            if (!rests) normal_ = pull.normal;
+            rests = true;
+          } else if (leads_into(pull.cell, pull.step, -1)) {
+            leads.push_back(pull);
+          }
+        }
+      }
+    }
+    if (!any) return Step::rim;
+    away_ = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : normal_;
+    if (goal_.may_leave && all_outside) return Step::left;
+    while (!leads.empty()) {
+      std::size_t best = 0;
+      for (std::size_t i = 1; i < leads.size(); ++i) best = leads[i].rate > leads[best].rate ? i : best;
+      normal_ = leads[best].normal;
+      if (follow(leads[best], -1)) return Step::moved;
+      leads.swap_remove(best);
+      rests = rests || leads.empty();
+    }
+    if (rests) return Step::rest;
+    // No cell leads anywhere but out of itself: a crease, along which it may go, or the rim.
+    if (goal_.may_leave && at_rim()) return Step::rim;
+    for (int face = 0; face < 3; ++face) {
+      if (!on_face_[face]) continue;
+      for (const Pull& pull : {pull_in(cell_towards(face, 1.0), face), pull_in(cell_towards(face, -1.0), face)}) {
+        if (!pull.known || pull.at_rest || !leads_into(pull.cell, pull.step, face)) continue;
+        if (follow(pull, face)) return Step::moved;
+      }
+    }
+    return Step::rest;
+  }
+
+  /// The cell on the face across `face` that the goal pulls towards, or away from (direction -1).
+  CellIndex cell_towards(int face, double direction) const noexcept {
+    CellIndex cell;
+    for (int a = 0; a < 3; ++a) {
+      const bool up = direction * (goal_.point[a] - x_[a]) > 0.0;
+      cell.at[a] = a != face && up ? last_[static_cast<std::size_t>(a)] : first_[static_cast<std::size_t>(a)];
+    }
+    return cell;
+  }
+
+  /// On the volume's border, or that of what is known, with the goal beyond.
+  bool at_rim() noexcept {
+    const double noise = along_face * (goal_.point - x_).norm();
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!on_face_[a]) continue;
+      const double d = goal_.point[static_cast<int>(a)] - x_[static_cast<int>(a)];
+      if (std::abs(d) <= noise) continue;
+      if (node_[a] == (d > 0.0 ? axes_[a].cells() : 0U)) return true;
+      if (first_[a] == last_[a]) continue;
+      CellIndex beyond{{first_[0], first_[1], first_[2]}};
+      beyond.at[a] = d > 0.0 ? last_[a] : first_[a];
+      if (load(beyond) == nullptr) return true;
+    }
+    return false;
+  }
+
+  /// Follows the pull to its end, or to the border of its cell. False when no part of it comes nearer.
+  bool follow(const Pull& pull, int face) noexcept {
+    constexpr int most_halvings = 12;
+    const CellPolynomial* cell = load(pull.cell);
+    const double before = (goal_.point - x_).squaredNorm();
+    double share = 1.0;
+    for (int attempt = 0; attempt < most_halvings; ++attempt, share *= 0.5) {
+      Vec3 y = x_ + share * pull.step - (share * share * pull.drop) * pull.normal;
+      if (!arrive(*cell, face, y)) continue;
+      if (!((goal_.point - y).squaredNorm() < before)) continue;
+      if (!same_sheet(*cell, pull, y)) {
+        cell = load(pull.cell);
+        continue;
+      }
+      x_ = y;
+      return true;
+    }
+    arrived_ = false;
+    return false;
+  }
+
+  /// Cuts the way from x to y at the cell's border and brings its end onto the surface there.
+  bool arrive(const CellPolynomial& cell, int face, Vec3& y) noexcept {
+    bool fixed[3] = {face == 0, face == 1, face == 2};
+    const Vec3 upper = upper_of(cell);
+    for (int a = 0; a < 3; ++a) {
+      if (fixed[a]) y[a] = x_[a];
+    }
+    for (int cut = 0; cut < 3; ++cut) {
+      double t = 1.0;
+      int axis = -1;
+      for (int a = 0; a < 3; ++a) {
+        if (fixed[a]) continue;
+        if (y[a] >= cell.lower[a] && y[a] <= upper[a]) continue;
+        const double limit = y[a] < cell.lower[a] ? cell.lower[a] : upper[a];
+        if (std::abs(y[a] - limit) <= 2.0 * on_face * cell.width[a]) {
+          // On the face already, and led along it: that is no border to stop at.
+          y[a] = limit;
+          continue;
+        }
+        const double way = y[a] - x_[a];
+        const double at = way != 0.0 ? std::clamp((limit - x_[a]) / way, 0.0, 1.0) : 0.0;
+        if (axis < 0 || at < t) {
+          t = at;
+          axis = a;
+        }
+      }
+      if (axis >= 0) {
+        const double limit = y[axis] < cell.lower[axis] ? cell.lower[axis] : upper[axis];
+        y = x_ + t * (y - x_);
+        y[axis] = limit;
+        fixed[axis] = true;
+      }
+      if (!project(cell, fixed, y)) return false;
+      bool inside = true;
+      for (int a = 0; a < 3; ++a) {
+        const double slack = 2.0 * on_face * cell.width[a];
+        inside = inside && y[a] >= cell.lower[a] - slack && y[a] <= upper[a] + slack;
+      }
+      if (!inside) continue;
+      y = y.cwiseMax(cell.lower).cwiseMin(upper);
+      return true;
+    }
+    return false;
+  }
+
+  /// The nodes themselves, so that a point on a face has the node's own coordinate.
+  Vec3 upper_of(const CellPolynomial& cell) const noexcept {
+    return {axes_[0].node(cell.cell.at[0] + 1), axes_[1].node(cell.cell.at[1] + 1), axes_[2].node(cell.cell.at[2] + 1)};
+  }
+
+  bool project(const CellPolynomial& cell, const bool fixed[3], Vec3& y) noexcept {
+    constexpr int most_rounds = 8;
+    const double close = nearly_on_surface * cell.width.minCoeff();
+    arrived_ = false;
+    for (int round = 0; round < most_rounds; ++round) {
+      ++moves_;
+      const FieldJet jet = cell.gradient(y);
+      Vec3 gradient = jet.gradient;
+      for (int a = 0; a < 3; ++a) {
+        if (fixed[a]) gradient[a] = 0.0;
+      }
+      const double squared = gradient.squaredNorm();
+      if (!(squared > 1e-12 * jet.gradient.squaredNorm())) return false;
+      const double off = jet.value - surface_.threshold;
+      const Vec3 step = (off / squared) * gradient;
+      const double length = step.squaredNorm();
+      if (length > cell.width.squaredNorm()) return false;
+      y -= step;
+      // Newton's next error is about the square of this one.
+      if (length > close * close) continue;
+      arrived_ = bend_cell_ == cell.cell;
+      arrived_cell_ = cell.cell;
+      arrived_gradient_ = jet.gradient;
+      return true;
+    }
+    return false;
+  }
+
+  /// Whether y is reached from x without passing the surface. In a cell all of whose gradients look the same way as the
+  /// normal the surface is one sheet over the tangent plane; elsewhere a way through free space is searched.
+  bool same_sheet(const CellPolynomial& cell, const Pull& pull, const Vec3& y) noexcept {
+    double least = 0.0;
+    double greatest = 0.0;
+    cell.slope_range(sign_ * pull.normal, least, greatest);
+    if (least > 0.0) return true;
+    const Vec3 gradient = sign_ * cell.gradient(y).gradient;
+    const double length = gradient.norm();
+    if (!(length > 0.0)) return false;
+    const double skin = surface_.skin();
+    const Vec3 from = x_ + skin * pull.normal;
+    const Vec3 to = y + skin * (gradient / length);
+    CellCache scratch;
+    IsoView view = surface_;
+    view.cells = &scratch;
+    const auto outside = [&](const Vec3& p) {
+      FieldJet jet;
+      return view.sample(p, jet) && sign_ * (jet.value - surface_.threshold) > 0.0;
+    };
+    if (!outside(from) || !outside(to)) return false;
+    if (!view.first_crossing({from, to}).found) return true;
+    const double way = (y - x_).norm();
+    for (const double lift : {0.1, 0.5, 1.0}) {
+      const Vec3 apex = 0.5 * (from + to) + lift * way * pull.normal;
+      if (!view.first_crossing({from, apex}).found && !view.first_crossing({apex, to}).found) return true;
+    }
+    return false;
+  }
+
+  const IsoView& surface_;
+  const GridAxes& axes_;
+  const Goal& goal_;
+  double sign_;
+  Vec3& x_;
+  Vec3& away_;
+  Vec3 normal_ = Vec3::Zero();
+  int moves_ = 0;
+  std::uint32_t first_[3] = {};
+  std::uint32_t last_[3] = {};
+  std::uint32_t node_[3] = {};  ///< along the axes on whose faces x lies
+  bool on_face_[3] = {};
+  Mat3 bend_ = Mat3::Zero();  ///< second derivatives of the last jet, in bend_cell_
+  CellIndex bend_cell_;
+  bool arrived_ = false;  ///< x was found by `project`, in arrived_cell_ = bend_cell_
+  CellIndex arrived_cell_;
+  Vec3 arrived_gradient_ = Vec3::Zero();
+};
+
+}  // namespace
+
+DescentEnd IsoView::descend(Place& place, IsoSpot& spot, const Goal& goal) const noexcept {
+  Leader leader(*this, goal, place.side(), spot);
+  const DescentEnd end = leader.run();
+  if (!leader.normal().isZero()) spot.front = place.side() * leader.normal();
+  place.at = spot.point;
+  return end;
+}
+
+}  // namespace asperity

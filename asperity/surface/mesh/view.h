@@ -1,0 +1,64 @@
+#pragma once
+// A triangle mesh as one tick touches it. Places are barycentric.
+
+#include "asperity/surface/face_chart.h"
+#include "asperity/surface/mesh/surface.h"
+
+namespace asperity {
+
+/// See SurfaceView; touched by a point or a ball. [servo]
+class TriangleView {
+ public:
+  using Spot = FlatSpot;
+
+  TriangleView(const MeshSurface& surface, SurfaceCache& cache) noexcept : surface_(&surface), cache_(&cache) {}
+
+  /// First touch of a ball moving along a segment.
+  [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides) const noexcept {
+    return surface_->index().sweep(motion, radius, sides, cache_->patch);
+  }
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
+  /// Every plane that a ball touches where it rests: what a constraint solve needs at once. (One that only knew the
+  /// last hit could not rest in a corner without finding the other walls again by moving.)
+  void contacts(const Vec3& position, double radius, Sides sides, ContactSet& out) const noexcept {
+    surface_->index().contacts(position, radius, sides, cache_->patch, out);
+  }
+  [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& = {}) const noexcept {
+    return surface_->index().closest(p, bound, cache_->patch);
+  }
+  [[nodiscard]] FlatSpot at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
+    return frame(place.element).at(place.at[1], place.at[2]);
+  }
+  /// The triangle of a place.
+  const FlatFrame& frame(std::uint32_t face) const noexcept;
+  /// Of the face, edge or vertex.
+  [[nodiscard]] Vec3 front(const Foot& foot) const noexcept {
+    return pseudonormal(surface_->mesh(), foot.element, foot.at).normalized();
+  }
+  /// From face to face; it ends as `blocked` where a part of the mesh is in the way that is not next to the face.
+  DescentEnd descend(Place& place, FlatSpot& spot, const Goal& goal) const noexcept;
+  bool launch(const Place& place, const FlatSpot& spot, Vec3& from) const noexcept {
+    from = spot.point + skin() * (place.side() * spot.front);
+    return true;
+  }
+  /// Whether one plane is all that holds a point there.
+  [[nodiscard]] static bool within_face(const Place& place) noexcept { return place.at.minCoeff() > on_border; }
+  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p, *cache_); }
+  [[nodiscard]] double skin() const noexcept { return surface_->skin(); }
+  [[nodiscard]] double grain() const noexcept { return surface_->mesh().mean_edge(); }
+  [[nodiscard]] static bool has_folds() noexcept { return true; }
+  [[nodiscard]] double direction_from() const noexcept { return skin(); }
+  [[nodiscard]] std::uint32_t element(const Place& place, const FlatSpot&) const noexcept { return place.element; }
+  [[nodiscard]] const MeshSurface& surface() const noexcept { return *surface_; }
+
+ private:
+  const MeshSurface* surface_;
+  SurfaceCache* cache_;
+};
+static_assert(SurfaceView<TriangleView>);
+
+inline TriangleView MeshSurface::view(SurfaceCache& cache) const noexcept {
+  return {*this, cache};
+}
+
+}  // namespace asperity

@@ -1,0 +1,301 @@
+// Where the faces of a relief meet in folds: rounding, and what it does to the heights.
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/core/fixed_vector.h"
+#include "asperity/surface/relief/detail/halfspaces.h"
+#include "asperity/surface/relief/detail/partners.h"
+#include "asperity/surface/relief/surface.h"
+
+namespace asperity {
+
+namespace {
+
+/// How far a face across has lost its say, from 0 to 1, at a place that is `share` of the way to the band's end.
+struct Fade {
+  double value = 0.0;
+  double slope = 0.0;  ///< by share
+};
+
+Fade fade_at(double share) noexcept {
+  const double t = std::clamp(2.0 * share - 1.0, 0.0, 1.0);
+  return {t * t * t * (10.0 + t * (6.0 * t - 15.0)), 60.0 * t * t * (1.0 - t) * (1.0 - t)};
+}
+
+/// Derivatives of the k-th barycentric coordinate along u and v.
+Vec2 coordinate_change(int k) noexcept {
+  return k == 0 ? Vec2(-1.0, -1.0) : (k == 1 ? Vec2(1.0, 0.0) : Vec2(0.0, 1.0));
+}
+
+/// Sine of the fold over an edge: above 0 where it is concave, the faces turned towards each other.
+double fold_sine(const TriangleMesh& mesh, std::uint32_t face, int edge, std::uint32_t other) noexcept {
+  const auto corners = mesh.corners(face);
+  const auto k = static_cast<std::size_t>(edge);
+  const Vec3 along = (corners[(k + 1) % 3] - corners[k]).normalized();
+  return -mesh.face_normal(face).cross(mesh.face_normal(other)).dot(along);
+}
+
+// A fold flatter than this is none.
+constexpr double flat_fold = 1e-9;
+
+}  // namespace
+
+void ReliefSurface::lay_fillets() {
+  fillets_.clear();
+  fillet_reach_.clear();
+  const Stitching& stitching = coat_.settings().stitching;
+  if (stitching.folds != FoldMode::fillet || bands_.empty()) return;
+  const TriangleMesh& mesh = base_.mesh();
+  fillets_.assign(mesh.positions().size(), static_cast<float>(stitching.fillet_radius));
+  fillet_reach_.assign(mesh.positions().size(), 1.0F);
+  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      float& reach = fillet_reach_[mesh.triangles()[face][k]];
+      reach = std::min(reach, bands_[face].reach[k]);
+    }
+  }
+  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
+    const auto corners = mesh.corners(face);
+    const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+    for (int edge = 0; edge < 3; ++edge) {
+      const auto k = static_cast<std::size_t>(edge);
+      const std::uint32_t other = mesh.neighbour(face, edge);
+      if (other == no_index) continue;
+      const double sine = fold_sine(mesh, face, edge, other);
+      const double cosine = mesh.face_normal(face).dot(mesh.face_normal(other));
+      double fits = infinity;
+      if (sine < -flat_fold) {
+        fits = 0.0;
+      } else if (sine > flat_fold) {
+        // The fillet touches each face a tangent of half the fold away from the edge: within the inner half of the
+        // band, where the face across has its whole say.
+        const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
+        const double half_tangent = sine / std::max(1e-6, 1.0 + cosine);
+        fits = 0.45 * static_cast<double>(band_to(face, edge)) * height / half_tangent;
+      }
+      for (std::size_t end = 0; end < 2; ++end) {
+        float& radius = fillets_[mesh.triangles()[face][(k + end) % 3]];
+        radius = std::min(radius, static_cast<float>(fits));
+      }
+    }
+  }
+}
+
+float ReliefSurface::band_to(std::uint32_t face, int edge) const noexcept {
+  // Not wider than what the faces around either end see of each other, so that both sides of every edge agree.
+  const TriangleMesh::Triangle& t = base_.mesh().triangles()[face];
+  const auto k = static_cast<std::size_t>(edge);
+  return std::min({bands_[face].look[(k + 2) % 3], fillet_reach_[t[k]], fillet_reach_[t[(k + 1) % 3]]});
+}
+
+double ReliefSurface::least_fillet() const noexcept {
+  return fillets_.empty() ? 0.0 : static_cast<double>(*std::min_element(fillets_.begin(), fillets_.end()));
+}
+
+double ReliefSurface::deepest_fold() const {
+  const TriangleMesh& mesh = base_.mesh();
+  if (coat_.settings().stitching.folds == FoldMode::fillet) {
+    // A ball in a corner lies as far from it as the corner's direction is long; and the face across, seen along
+    // directions that lean away from it by a band's share, stands that much higher.
+    double longest = 1.0;
+    for (const Vec3f& direction : shell_.directions) longest = std::max(longest, static_cast<double>(direction.norm()));
+    return coat_.settings().stitching.fillet_radius * (1.25 * longest - 1.0 + 0.05) +
+           0.25 * (coat_.highest() - coat_.lowest());
+  }
+  double depth = 0.0;
+  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
+    const auto corners = mesh.corners(face);
+    const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+    for (int edge = 0; edge < 3; ++edge) {
+      const auto k = static_cast<std::size_t>(edge);
+      const std::uint32_t other = mesh.neighbour(face, edge);
+      if (other == no_index) continue;
+      // Within a band of half width w the other plane runs off by at most w times the tangent of the fold; folds
+      // sharper than 70 degrees are rounded no deeper than those.
+      const double cosine = std::max(0.3, mesh.face_normal(face).dot(mesh.face_normal(other)));
+      const double slope = std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
+      const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
+      depth = std::max(depth, 4.0 * static_cast<double>(bands_[face].rho[(k + 2) % 3]) * height * slope);
+    }
+  }
+  return depth;
+}
+
+FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
+  const TriangleMesh& mesh = base_.mesh();
+  const TriangleMesh::Triangle& corners = mesh.triangles()[frame.face];
+  const Vec3 p = frame.prism.point(place);
+  const ShellGradients gradients = shell_gradients(frame.prism, place);
+  const auto along = [&](const Vec2& by) { return Vec3(by.x() * gradients.u + by.y() * gradients.v); };
+  double radius = 0.0;
+  Vec3 radius_gradient = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto at_vertex = static_cast<double>(fillets_[corners[static_cast<std::size_t>(k)]]);
+    radius += at_vertex * coordinate(k, place.u, place.v);
+    radius_gradient += at_vertex * along(coordinate_change(k));
+  }
+  // What a face that has lost its say is moved away by: more than any two faces differ.
+  const double gone = 2.0 * (coat_.settings().stitching.fillet_radius + coat_.highest() - coat_.lowest());
+
+  struct Wall {
+    double distance = 0.0;
+    Vec3 gradient = Vec3::Zero();
+    Vec3 normal = Vec3::Zero();
+  };
+  FixedVector<Wall, 8> walls;
+  // Distance from a face with its height: its penetration, which is along the directions, measured along its normal.
+  double lean = 1.0;
+  Vec3 lean_gradient = Vec3::Zero();
+  double height = 0.0;
+  const auto wall_of = [&](const ReliefFrame& one, const ShellPlace& at) {
+    const FieldSample own = own_field(one, at);
+    const ShellGradients by = shell_gradients(one.prism, at);
+    Wall wall;
+    wall.normal = one.prism.edge_u.cross(one.prism.edge_v).normalized();
+    lean = wall.normal.dot(one.prism.direction_at(at.u, at.v));
+    lean_gradient = wall.normal.dot(one.prism.turn_u) * by.u + wall.normal.dot(one.prism.turn_v) * by.v;
+    wall.distance = lean * own.value;
+    wall.gradient = lean * own.gradient + own.value * lean_gradient;
+    height = own.height;
+    return wall;
+  };
+  const auto add = [&](std::uint32_t other) {
+    // Shares of the way to the ends of the bands around common vertices and the common edge; the least counts.
+    double share = 1.0;
+    Vec3 share_gradient = Vec3::Zero();
+    const auto offer = [&](double distance, double width, const Vec2& change) {
+      if (!(distance < width * share)) return;
+      share = distance / width;
+      share_gradient = along(change) / width;
+    };
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = corners[static_cast<std::size_t>(k)];
+      const auto& there = mesh.triangles()[other];
+      if (there[0] != vertex && there[1] != vertex && there[2] != vertex) continue;
+      if (!(fillets_[vertex] > 0.0F)) continue;
+      offer(1.0 - coordinate(k, place.u, place.v), static_cast<double>(fillet_reach_[vertex]), -coordinate_change(k));
+    }
+    for (int edge = 0; edge < 3; ++edge) {
+      if (mesh.neighbour(frame.face, edge) != other || fold_sine(mesh, frame.face, edge, other) < -flat_fold) continue;
+      const int k = (edge + 2) % 3;
+      offer(std::max(0.0, coordinate(k, place.u, place.v)), static_cast<double>(band_to(frame.face, edge)),
+            coordinate_change(k));
+    }
+    if (share >= 1.0) return;
+    const ReliefFrame there = this->frame(other, frame.coat.moment);
+    const Projection guess = project(frame.prism, place.u, place.v, there.prism);
+    if (!guess.seen) return;
+    ShellPlace at{guess.u, guess.v, place.height};
+    if (!there.prism.invert(p, at)) return;
+    Wall wall = wall_of(there, at);
+    const Fade fade = fade_at(share);
+    wall.distance += gone * fade.value;
+    wall.gradient += gone * fade.slope * share_gradient;
+    walls.push_back(wall);
+  };
+  for_each_partner(frame, place.u, place.v, add);
+  const Wall own = wall_of(frame, place);
+  const double own_height = height;
+  if (!walls.push_back(own)) walls[walls.size() - 1] = own;
+
+  HalfSpace spaces[8];
+  for (std::size_t i = 0; i < walls.size(); ++i) spaces[i] = {walls[i].normal, radius - walls[i].distance};
+  const NearestInHalfSpaces centre = nearest_in_halfspaces({spaces, walls.size()}, 1e-12 * (radius + skin_));
+  double value = infinity;
+  Vec3 gradient = Vec3::Zero();
+  const double away = centre.point.norm();
+  if (centre.found && away > 0.0) {
+    value = radius - away;
+    double sum = 0.0;
+    for (int k = 0; k < centre.count; ++k) {
+      const double part = centre.force[k] / away;
+      sum += part;
+      gradient += part * walls[centre.active[k]].gradient;
+    }
+    gradient += (1.0 - sum) * radius_gradient;
+  } else {
+    // Farther than the radius from all of them; or walls that nearly oppose each other, and no ball fits.
+    for (const Wall& wall : walls) {
+      if (wall.distance >= value) continue;
+      value = wall.distance;
+      gradient = wall.gradient;
+    }
+  }
+  // As the face's own field beside the band: penetration along the directions.
+  FieldSample sample;
+  sample.element = frame.face;
+  sample.height = own_height;
+  sample.value = value / lean;
+  sample.gradient = (gradient - sample.value * lean_gradient) / lean;
+  return sample;
+}
+
+FieldSample ReliefSurface::round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
+  const Stitching& stitching = coat_.settings().stitching;
+  if (stitching.folds == FoldMode::fillet) return fillet_field(frame, place);
+  const Vec3 p = frame.prism.point(place);
+  double weights = 0.0;
+  double values = 0.0;
+  double heights = 0.0;
+  Vec3 weight_gradient = Vec3::Zero();
+  Vec3 value_gradient = Vec3::Zero();
+  const auto add = [&](const ReliefFrame& one, const ShellPlace& at) {
+    const PlaceWeight weight = place_weight(stitching, one.band, at.u, at.v);
+    if (weight.weight <= 0.0) return;
+    const FieldSample own = own_field(one, at);
+    const ShellGradients gradients = shell_gradients(one.prism, at);
+    const Vec3 slope = weight.u * gradients.u + weight.v * gradients.v;
+    weights += weight.weight;
+    values += weight.weight * own.value;
+    heights += weight.weight * own.height;
+    weight_gradient += slope;
+    value_gradient += own.value * slope + weight.weight * own.gradient;
+  };
+  add(frame, place);
+  for_each_partner(frame, place.u, place.v, [&](std::uint32_t other) {
+    const ReliefFrame there = this->frame(other, frame.coat.moment);
+    const Projection guess = project(frame.prism, place.u, place.v, there.prism);
+    if (!guess.seen) return;
+    ShellPlace at{guess.u, guess.v, place.height};
+    if (there.prism.invert(p, at)) add(there, at);
+  });
+  FieldSample sample;
+  sample.element = frame.face;
+  sample.value = values / weights;
+  sample.height = heights / weights;
+  sample.gradient = (value_gradient - sample.value * weight_gradient) / weights;
+  return sample;
+}
+
+HeightJet ReliefSurface::rounded(const ReliefFrame& frame, double u, double v) const noexcept {
+  // The root of Phi along the shell's ray, by Newton's method: Phi rises along it by about 1 a metre of height.
+  HeightJet jet = coat_.jet(frame.coat, u, v);
+  lower_by_share(frame, u, v, jet);
+  constexpr int most_steps = 12;
+  const Vec3 direction = frame.prism.direction_at(u, v);
+  ShellPlace at{u, v, jet.height};
+  FieldSample sample;
+  for (int i = 0; i < most_steps; ++i) {
+    sample = round_field(frame, at);
+    const double rise = sample.gradient.dot(direction);
+    if (!(rise > 0.1)) break;
+    const double step = sample.value / rise;
+    at.height -= step;
+    if (std::abs(step) <= 1e-15 * (1.0 + std::abs(at.height))) break;
+    if (std::abs(step) <= 1e-9 * skin_) break;
+  }
+  const double rise = std::max(0.1, sample.gradient.dot(direction));
+  const Stitching& stitching = coat_.settings().stitching;
+  if (stitching.folds == FoldMode::round && std::isfinite(stitching.most_rounding))
+    at.height = std::clamp(at.height, jet.height - stitching.most_rounding, jet.height + stitching.most_rounding);
+  // Over folds too sharp to be rounded the root may run away: no farther than `range` says.
+  at.height =
+      std::clamp(at.height, std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_);
+  jet.height = at.height;
+  jet.u = -sample.gradient.dot(frame.prism.edge_u + at.height * frame.prism.turn_u) / rise;
+  jet.v = -sample.gradient.dot(frame.prism.edge_v + at.height * frame.prism.turn_v) / rise;
+  return jet;
+}
+
+}  // namespace asperity

@@ -1,0 +1,251 @@
+// Heights and points of a relief over its faces, and where a place in space lies in its shell.
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/surface/relief/detail/partners.h"
+#include "asperity/surface/relief/surface.h"
+
+namespace asperity {
+
+bool ReliefSurface::in_band(const ReliefFrame& frame, double u, double v) const noexcept {
+  if (!frame.stitched) return false;
+  for (int k = 0; k < 3; ++k) {
+    const double b = coordinate(k, u, v);
+    if (b < static_cast<double>(frame.band.look[k]) || b > 1.0 - static_cast<double>(frame.band.reach[k])) return true;
+  }
+  return false;
+}
+
+HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {
+  if (!in_band(frame, u, v)) {
+    HeightJet jet = coat_.jet(frame.coat, u, v);
+    lower_by_share(frame, u, v, jet);
+    return jet;
+  }
+  return coat_.settings().stitching.folds == FoldMode::keep ? stitched(frame, u, v) : rounded(frame, u, v);
+}
+
+HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) const noexcept {
+  const Stitching& stitching = coat_.settings().stitching;
+  const TriangleMesh& mesh = base_.mesh();
+  const PlaceWeight own = place_weight(stitching, frame.band, u, v);
+  const HeightJet jet = coat_.jet(frame.coat, u, v);
+  const double seam = frame.seam + u * frame.seam_u + v * frame.seam_v;
+  PlaceWeight total = own;
+  HeightJet sum{own.weight * jet.height,
+                own.u * jet.height + own.weight * jet.u,
+                own.v * jet.height + own.weight * jet.v,
+                own.weight * jet.uu + 2.0 * own.u * jet.u,
+                own.weight * jet.uv + own.u * jet.v + own.v * jet.u,
+                own.weight * jet.vv + 2.0 * own.v * jet.v};
+  for_each_partner(frame, u, v, [&](std::uint32_t other) {
+    const ShellPrism prism = shell_.prism(mesh, other);
+    const Projection at = project(frame.prism, u, v, prism);
+    if (!at.seen) return;
+    PlaceWeight there = place_weight(stitching, bands_[other], at.u, at.v);
+    if (there.weight <= 0.0) return;
+    const HeightJet heights = coat_.jet(coat_.frame(rest_.mesh(), other, frame.coat.moment), at.u, at.v);
+    double weight_u = there.u * at.by_u.x() + there.v * at.by_u.y();
+    double weight_v = there.u * at.by_v.x() + there.v * at.by_v.y();
+    if (frame.partly) {
+      weight_u = seam * weight_u + frame.seam_u * there.weight;
+      weight_v = seam * weight_v + frame.seam_v * there.weight;
+      there.weight *= seam;
+    }
+    const double height_u = heights.u * at.by_u.x() + heights.v * at.by_u.y();
+    const double height_v = heights.u * at.by_v.x() + heights.v * at.by_v.y();
+    const auto second = [&](const Vec2& a, const Vec2& b) {
+      return heights.uu * a.x() * b.x() + heights.uv * (a.x() * b.y() + a.y() * b.x()) + heights.vv * a.y() * b.y();
+    };
+    total.weight += there.weight;
+    total.u += weight_u;
+    total.v += weight_v;
+    sum.height += there.weight * heights.height;
+    sum.u += weight_u * heights.height + there.weight * height_u;
+    sum.v += weight_v * heights.height + there.weight * height_v;
+    sum.uu += there.weight * second(at.by_u, at.by_u) + 2.0 * weight_u * height_u;
+    sum.uv += there.weight * second(at.by_u, at.by_v) + weight_u * height_v + weight_v * height_u;
+    sum.vv += there.weight * second(at.by_v, at.by_v) + 2.0 * weight_v * height_v;
+  });
+  // The second derivatives leave out those of the weights and of the projection: they guide steps, forces never see
+  // them.
+  const double per = 1.0 / total.weight;
+  HeightJet blended;
+  blended.height = sum.height * per;
+  blended.u = (sum.u - blended.height * total.u) * per;
+  blended.v = (sum.v - blended.height * total.v) * per;
+  blended.uu = (sum.uu - 2.0 * blended.u * total.u) * per;
+  blended.uv = (sum.uv - blended.u * total.v - blended.v * total.u) * per;
+  blended.vv = (sum.vv - 2.0 * blended.v * total.v) * per;
+  lower_by_share(frame, u, v, blended);
+  return blended;
+}
+
+ReliefPoint ReliefSurface::point(const ReliefFrame& frame, double u, double v) const noexcept {
+  ReliefPoint spot;
+  spot.jet = height(frame, u, v);
+  const Vec3 direction = frame.prism.direction_at(u, v);
+  spot.point = frame.prism.base_at(u, v) + spot.jet.height * direction;
+  spot.along_u = frame.prism.edge_u + spot.jet.u * direction + spot.jet.height * frame.prism.turn_u;
+  spot.along_v = frame.prism.edge_v + spot.jet.v * direction + spot.jet.height * frame.prism.turn_v;
+  spot.front = spot.along_u.cross(spot.along_v);
+  const double size = spot.front.norm();
+  if (size > 0.0) spot.front /= size;
+  return spot;
+}
+
+HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept {
+  HeightRange all = coat_.range(frame.coat, corners);
+  const auto include = [&](const HeightRange& other) {
+    all.lowest = std::min(all.lowest, other.lowest);
+    all.highest = std::max(all.highest, other.highest);
+  };
+  bool rounds = false;
+  const double bounded = coat_.settings().stitching.most_rounding;
+  const bool near_own = coat_.settings().stitching.folds == FoldMode::round && std::isfinite(bounded);
+  if (frame.stitched && !near_own) {
+    const TriangleMesh& mesh = base_.mesh();
+    const Vec2 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+    double size = 0.0;
+    for (int k = 0; k < 3; ++k) size = std::max(size, (corners[k] - middle).cwiseAbs().maxCoeff());
+    // A small triangle is projected by its corners, with room for the projection's bend; a large one may have all that
+    // the other face says anywhere.
+    constexpr double small = 0.06;
+    constexpr double room = 1.6;
+    const auto add = [&](std::uint32_t other) {
+      const CoatFrame coat = coat_.frame(rest_.mesh(), other, frame.coat.moment);
+      Vec2 there[3] = {Vec2(-0.4, -0.4), Vec2(1.8, -0.4), Vec2(-0.4, 1.8)};
+      if (size <= small) {
+        const ShellPrism prism = shell_.prism(mesh, other);
+        Projection at[3];
+        bool seen = true;
+        for (int k = 0; k < 3; ++k) {
+          at[k] = project(frame.prism, corners[k].x(), corners[k].y(), prism);
+          seen = seen && at[k].seen;
+        }
+        if (seen) {
+          const Vec2 centre((at[0].u + at[1].u + at[2].u) / 3.0, (at[0].v + at[1].v + at[2].v) / 3.0);
+          for (int k = 0; k < 3; ++k) there[k] = centre + room * (Vec2(at[k].u, at[k].v) - centre);
+        }
+      }
+      include(coat_.range(coat, there));
+    };
+    bool in_edge = false;
+    for (int k = 0; k < 3; ++k) {
+      double least = infinity;
+      double most = -infinity;
+      for (int c = 0; c < 3; ++c) {
+        const double b = coordinate(k, corners[c].x(), corners[c].y());
+        least = std::min(least, b);
+        most = std::max(most, b);
+      }
+      if (most > 1.0 - static_cast<double>(frame.band.reach[k])) {
+        const std::uint32_t vertex = mesh.triangles()[frame.face][static_cast<std::size_t>(k)];
+        for (const std::uint32_t other : mesh.faces_of_vertex(vertex)) {
+          if (other != frame.face) add(other);
+        }
+        in_edge = true;
+      } else if (least < static_cast<double>(frame.band.look[k])) {
+        const std::uint32_t other = mesh.neighbour(frame.face, (k + 1) % 3);
+        if (other != no_index) add(other);
+        in_edge = true;
+      }
+    }
+    rounds = in_edge && coat_.settings().stitching.folds != FoldMode::keep;
+  }
+  if (frame.lowered) {
+    double least = infinity;
+    double most = -infinity;
+    for (int k = 0; k < 3; ++k) {
+      const double share = frame.share + corners[k].x() * frame.share_u + corners[k].y() * frame.share_v;
+      least = std::min(least, share);
+      most = std::max(most, share);
+    }
+    all = {std::min(all.lowest * least, all.lowest * most), std::max(all.highest * least, all.highest * most)};
+  }
+  if (frame.stitched && near_own) {
+    all.lowest -= bounded;
+    all.highest += bounded;
+  }
+  // The root of a rounded fold may lie anywhere that `rounded` lets it.
+  if (rounds) {
+    include({std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_});
+  }
+  return all;
+}
+
+bool ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
+                           ShellPlace& place) const noexcept {
+  constexpr int most_walks = 24;
+  constexpr double inside = -1e-10;
+  const Foot foot = base_.index().closest(p, infinity, cache.patch);
+  if (!foot.found()) return false;
+  const TriangleMesh& mesh = base_.mesh();
+  std::uint32_t face = foot.element;
+  place = {foot.at[1], foot.at[2], 0.0};
+  const double above = mesh.face_normal(face).dot(p - foot.point);
+  place.height = std::copysign(foot.distance, above);
+  for (int walk = 0; walk < most_walks; ++walk) {
+    ReliefCache& last = cache.relief;
+    if (!holds(last.place.frame, face, moment)) {
+      last.place.frame = this->frame(face, moment);
+      last.evaluated = false;
+    }
+    const ShellPrism& prism = last.place.frame.prism;
+    if (!prism.invert(p, place) && !prism.invert_anew(p, place)) return false;
+    const Vec3 barycentric = place.barycentric();
+    int out = 0;
+    if (barycentric.minCoeff(&out) >= inside) {
+      frame = last.place.frame;
+      return true;
+    }
+    const std::uint32_t other = mesh.neighbour(face, (out + 1) % 3);
+    if (other == no_index) return false;
+    // Guess: the same height over the common edge.
+    const Vec3 edge = prism.base_at(place.u, place.v);
+    face = other;
+    const Vec3 guess = barycentric_frame(mesh, face).coordinates(edge);
+    place.u = guess[1];
+    place.v = guess[2];
+  }
+  return false;
+}
+
+FieldSample ReliefSurface::own_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
+  HeightJet jet = coat_.jet(frame.coat, place.u, place.v);
+  lower_by_share(frame, place.u, place.v, jet);
+  const ShellGradients gradients = shell_gradients(frame.prism, place);
+  return {place.height - jet.height, gradients.height - jet.u * gradients.u - jet.v * gradients.v, jet.height,
+          frame.face};
+}
+
+FieldSample ReliefSurface::field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
+  if (!in_band(frame, place.u, place.v)) return own_field(frame, place);
+  if (coat_.settings().stitching.folds != FoldMode::keep) return round_field(frame, place);
+  const HeightJet jet = stitched(frame, place.u, place.v);
+  const ShellGradients gradients = shell_gradients(frame.prism, place);
+  return {place.height - jet.height, gradients.height - jet.u * gradients.u - jet.v * gradients.v, jet.height,
+          frame.face};
+}
+
+FieldSample ReliefSurface::eval(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment) const noexcept {
+  ReliefFrame owner;
+  ShellPlace place;
+  if (locate(p, cache, moment, owner, place)) return field(owner, place);
+  const Foot nearest = base_.index().closest(p, infinity, cache.patch);
+  FieldSample sample;
+  if (!nearest.found()) return sample;
+  const TriangleMesh& mesh = base_.mesh();
+  const bool outside = (p - nearest.point).dot(pseudonormal(mesh, nearest.element, nearest.at)) >= 0.0;
+  const CoatSample coat = coat_sample(nearest.element, nearest.at, moment);
+  sample.gradient = outside ? nearest.normal : Vec3(-nearest.normal);
+  if (nearest.distance == 0.0) sample.gradient = mesh.face_normal(nearest.element);
+  sample.gradient -= coat.gradient;
+  sample.height = coat.height;
+  sample.value = (outside ? nearest.distance : -nearest.distance) - coat.height;
+  sample.element = nearest.element;
+  return sample;
+}
+
+}  // namespace asperity

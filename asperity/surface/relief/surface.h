@@ -1,0 +1,177 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "asperity/core/names.h"
+#include "asperity/surface/coat.h"
+#include "asperity/surface/mesh/surface.h"
+#include "asperity/surface/relief/frame.h"
+#include "asperity/surface/relief/prisms.h"
+
+namespace asperity {
+
+class ReliefView;
+
+/// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
+enum class OnOverlap {
+  cure,    ///< turn the directions where that helps, then lower the relief around the vertices at fault, and report it
+  refuse,  ///< Error naming the faces and vertices
+};
+/// As in scene files.
+template <>
+struct Names<OnOverlap> {
+  static constexpr auto table =
+      std::to_array<Named<OnOverlap>>({{OnOverlap::cure, "cure"}, {OnOverlap::refuse, "refuse"}});
+};
+
+/// How a relief is made from a base and a coat.
+struct ReliefSettings {
+  ShellDirections directions = ShellDirections::least_squares;
+  OnOverlap on_overlap = OnOverlap::cure;
+};
+
+/// What building a relief found out.
+struct ReliefReport {
+  std::vector<std::uint32_t> faces_at_fault;  ///< whose prism folds over within the coat's heights, before any cure
+  std::vector<std::uint32_t> blind_vertices;  ///< without a direction that all their faces see from the front
+  double fitting_share = 1.0;                 ///< of the coat's amplitude at which every prism is one to one; 0: none
+  std::uint32_t lowered_vertices = 0;         ///< where the cure renders less than the coat's height
+  double least_share = 1.0;                   ///< the least of what is rendered there
+  bool directions_relaxed = false;            ///< the cure turned the directions
+  std::uint32_t overlapping_pairs = 0;        ///< of faces without a common vertex whose reliefs' bounds meet in space
+  [[nodiscard]] bool fits() const noexcept { return faces_at_fault.empty() && blind_vertices.empty(); }
+  /// One sentence on what is wrong and what would cure it; empty when all fits. [any]
+  [[nodiscard]] std::string advice() const;
+};
+
+/// A base mesh that wears a coat of relief: the displaced surface x = V + H N itself (formulation D2, D3).
+///
+/// Over each triangle x is a smooth function of the barycentric coordinates; neighbours share directions and, through
+/// stitching, heights, so that the surface is closed wherever the base is. All queries are about that surface, at one
+/// moment of its coat, which may have levels of detail and change with time (ReliefView). On an open base the relief
+/// ends at the rim.
+class ReliefSurface {
+ public:
+  /// Errors: mismatch (a coat that was laid on another mesh than the base's), bad_mesh (a relief that folds over, when
+  /// `settings` refuse that), naming faces, vertices and the largest share of the amplitude that fits. [build]
+  static Result<ReliefSurface> build(MeshSurface base, Coat coat, const ReliefSettings& settings = {});
+  /// The same with the default settings, for a coat that is known to have been laid on this base: with another one the
+  /// program ends with build's message. [build]
+  ReliefSurface(MeshSurface base, Coat coat);
+  /// The same coat, asked for in the same way, on the base after its vertices moved (DeformableMesh): shell, bands and
+  /// room for the heights are found anew. Mappings go by places (triplanar, solid) of the mesh that the coat was laid
+  /// on, so that nothing swims. Errors: mismatch (a base of another lineage), bad_mesh as build. [build]
+  [[nodiscard]] Result<ReliefSurface> moved(MeshSurface base) const;
+  /// The mesh that the coat was laid on: what Coat::frame is asked with. [servo]
+  [[nodiscard]] const TriangleMesh& rest_mesh() const noexcept { return rest_.mesh(); }
+  /// Coat::sample on this surface: mapped by the mesh that the coat was laid on, gradient and normal in the plane of
+  /// the face as it lies now. [servo]
+  [[nodiscard]] CoatSample coat_sample(std::uint32_t face, const Vec3& barycentric,
+                                       const CoatMoment& moment = {}) const noexcept;
+
+  /// What is touched of it at a moment of its coat. [servo]
+  [[nodiscard]] ReliefView view(SurfaceCache& cache, const CoatMoment& moment = {}) const noexcept;
+  /// Phi = h - H in shell coordinates, blended where faces are stitched, and its gradient. Not a distance: its gradient
+  /// is as long as the relief is steep. Where the shell does not reach, the nearest base point's own. [servo]
+  [[nodiscard]] FieldSample eval(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment = {}) const noexcept;
+  [[nodiscard]] double skin() const noexcept { return skin_; }
+  [[nodiscard]] Box bounds() const noexcept { return base_.bounds().grown(reach_); }
+
+  /// What evaluating the relief over `face` needs. [servo]
+  [[nodiscard]] ReliefFrame frame(std::uint32_t face, const CoatMoment& moment = {}) const noexcept;
+  /// Tells reliefs apart, never 0: whose frames a cache holds. [any]
+  [[nodiscard]] std::uint64_t identity() const noexcept { return identity_; }
+  /// Whether a frame is this surface's own, of the face and the moment. [servo]
+  [[nodiscard]] bool holds(const ReliefFrame& frame, std::uint32_t face, const CoatMoment& moment) const noexcept {
+    return frame.owner == identity_ && frame.face == face && frame.coat.moment == moment;
+  }
+  /// Height as rendered over a place of the frame's triangle. [servo]
+  [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// The displaced surface over it. [servo]
+  [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// Bounds of the height as rendered, over the triangle with these corners. [servo]
+  [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. False where no
+  /// prism holds p. [servo]
+  [[nodiscard]] bool locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
+                            ShellPlace& place) const noexcept;
+  /// Value and gradient of Phi at a located place. [servo]
+  [[nodiscard]] FieldSample field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  /// Value and gradient of h - H with the face's own height, not stitched (Algorithm 1). [servo]
+  [[nodiscard]] FieldSample own_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+
+  [[nodiscard]] const MeshSurface& base() const noexcept { return base_; }
+  [[nodiscard]] const Coat& coat() const noexcept { return coat_; }
+  [[nodiscard]] const Shell& shell() const noexcept { return shell_; }
+  [[nodiscard]] const ReliefReport& report() const noexcept { return report_; }
+  [[nodiscard]] Prisms prisms() const noexcept { return {base_.mesh(), coat_.amplitude_bound()}; }
+  /// Smallest length (m) over which the relief changes: steps along the surface are measured by it. [any]
+  [[nodiscard]] double grain() const noexcept { return grain_; }
+  /// Whether heights of neighbouring faces may differ at their edge (no blend was asked for). [any]
+  [[nodiscard]] bool has_jumps() const noexcept { return coat_.has_seams() && bands_.empty(); }
+  /// Whether reliefs of faces without a common vertex come into one another anywhere; and into that of `face`. [servo]
+  [[nodiscard]] bool overlaps() const noexcept { return report_.overlapping_pairs > 0; }
+  /// [servo]
+  [[nodiscard]] bool overlapped(std::uint32_t face) const noexcept {
+    return !overlapped_.empty() && overlapped_[face] != 0;
+  }
+  /// Folds `fillet`: the least radius that a fillet has anywhere (m): 0 where a convex fold ends; 0 in other modes.
+  /// [any]
+  [[nodiscard]] double least_fillet() const noexcept;
+  /// How far the displaced surface is from its base at most (m). [any]
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// Bytes of coat, base, search structure and shell. [any]
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+
+ private:
+  ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest);
+  /// Does what the settings ask beyond the default.
+  Status settle(const ReliefSettings& settings);
+  void fit(ShellDirections directions);
+  void lay_bands();
+  /// Per face: of the heights over it, the share that its prism has room for.
+  [[nodiscard]] std::vector<double> fitting_shares() const;
+  [[nodiscard]] double deepest_fold() const;
+  void lay_fillets();
+  [[nodiscard]] float band_to(std::uint32_t face, int edge) const noexcept;
+  void lower(const std::vector<double>& share_of_face);
+  void find_overlaps();
+  [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
+  template <class Visit>
+  void for_each_partner(const ReliefFrame& frame, double u, double v, Visit&& visit) const noexcept;
+
+  std::uint64_t identity_ = 0;
+  MeshSurface base_;
+  MeshSurface rest_;  ///< that the coat was laid on
+  Coat coat_;
+  ReliefSettings settings_;
+  Shell shell_;
+  std::vector<StitchBand> bands_;         ///< one a face, or empty: nothing to stitch
+  std::vector<float> fillets_;            ///< one a vertex, or empty: radius of the ball in concave folds (m)
+  std::vector<float> fillet_reach_;       ///< one a vertex: 1 - its coordinate, up to which all faces around have a say
+  std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
+  std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
+  ReliefReport report_;
+  double reach_ = 0.0;
+  double skin_ = 0.0;
+  double grain_ = 0.0;
+  double fold_depth_ = 0.0;  ///< by how much rounding folds may move the surface (m)
+};
+
+/// Lays a coat of these parts on a mesh and makes the relief of both. The mesh is named once, so the coat can be on no
+/// other than the one it is touched with. Errors: those of Coat::build, then those of ReliefSurface::build. [build]
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, CoatParts parts,
+                                                         const CoatSettings& coat = {},
+                                                         const ReliefSettings& relief = {});
+/// The same of one mesostructure all over the mesh. [build]
+Result<std::shared_ptr<const ReliefSurface>> make_relief(MeshSurface base, Mesostructure maps,
+                                                         const CoatSettings& coat = {},
+                                                         const ReliefSettings& relief = {});
+
+}  // namespace asperity

@@ -1,0 +1,121 @@
+#include "asperity/surface/relief/view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/surface/face_chart.h"
+#include "asperity/surface/tangents.h"
+
+namespace asperity {
+
+namespace {
+
+// A step below these shares of the relief's grain and of the mean edge is not worth making, once one has been made.
+constexpr double relief_rest_of_grain = 5e-4;
+constexpr double rest_of_edge = 5e-6;
+// The first one always is, unless the probe has not moved at all.
+constexpr double first_rest_of_grain = 1e-10;
+// Distance (in grains) between places where the way is checked.
+constexpr double stride_of_grain = 0.75;
+
+/// A relief over its faces, at the moment of the frame that the walk starts with.
+struct ReliefFaces {
+  using Frame = ReliefFrame;
+  using Spot = ReliefPoint;
+
+  const ReliefSurface& surface;
+  CoatMoment moment;
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface.base().mesh(); }
+  [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept { return surface.frame(face, moment); }
+  [[nodiscard]] ReliefPoint evaluate(const ReliefFrame& frame, double u, double v) const noexcept {
+    return surface.point(frame, u, v);
+  }
+  [[nodiscard]] static WalkForms forms(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& goal) noexcept {
+    const ShellPrism& prism = place.frame.prism;
+    const Vec3 rest = spot.point - goal;
+    const double n = prism.direction_at(place.u, place.v).dot(rest);
+    const double turn_u = prism.turn_u.dot(rest);
+    const double turn_v = prism.turn_v.dot(rest);
+    WalkForms f;
+    f.g_u = spot.along_u.dot(rest);
+    f.g_v = spot.along_v.dot(rest);
+    f.uu = spot.along_u.squaredNorm();
+    f.uv = spot.along_u.dot(spot.along_v);
+    f.vv = spot.along_v.squaredNorm();
+    f.h_uu = f.uu + spot.jet.uu * n + 2.0 * spot.jet.u * turn_u;
+    f.h_uv = f.uv + spot.jet.uv * n + spot.jet.u * turn_v + spot.jet.v * turn_u;
+    f.h_vv = f.vv + spot.jet.vv * n + 2.0 * spot.jet.v * turn_v;
+    return f;
+  }
+  [[nodiscard]] static double curvature(const ReliefPlace& place, const ReliefPoint& spot, double du, double dv,
+                                        const Vec3& rest) noexcept {
+    const ShellPrism& prism = place.frame.prism;
+    const double bend = du * du * spot.jet.uu + 2.0 * du * dv * spot.jet.uv + dv * dv * spot.jet.vv;
+    const double slope = du * spot.jet.u + dv * spot.jet.v;
+    const Vec3 turn = du * prism.turn_u + dv * prism.turn_v;
+    return bend * prism.direction_at(place.u, place.v).dot(rest) + 2.0 * slope * turn.dot(rest);
+  }
+  [[nodiscard]] double rest_length(bool first) const noexcept {
+    const double rest = std::min(relief_rest_of_grain * surface.grain(), rest_of_edge * mesh().mean_edge());
+    return first ? std::min(first_rest_of_grain * surface.grain(), rest) : rest;
+  }
+  [[nodiscard]] double stride() const noexcept { return stride_of_grain * surface.grain(); }
+  [[nodiscard]] bool jumps() const noexcept { return surface.has_jumps(); }
+  [[nodiscard]] static bool free(const ReliefFrame&, const ReliefPoint&, const ReliefPoint&) noexcept { return true; }
+};
+
+}  // namespace
+
+DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
+                   const Goal& goal) noexcept {
+  const ReliefFaces faces{surface, place.frame.coat.moment};
+  FaceChart<ReliefFaces> chart(faces, place, spot);
+  return Walk<FaceChart<ReliefFaces>>(chart, goal, side).run();
+}
+
+ReliefCache& ReliefView::hold(std::uint32_t face) const noexcept {
+  ReliefCache& cache = cache_->relief;
+  if (!surface_->holds(cache.place.frame, face, moment_)) {
+    cache.place.frame = surface_->frame(face, moment_);
+    cache.evaluated = false;
+  }
+  return cache;
+}
+
+ReliefPoint ReliefView::at(const Place& place, const Vec3&) const noexcept {
+  ReliefCache& cache = hold(place.element);
+  const double u = place.at[1];
+  const double v = place.at[2];
+  if (!cache.evaluated || cache.place.u != u || cache.place.v != v) {
+    cache.place.u = u;
+    cache.place.v = v;
+    cache.spot = surface_->point(cache.place.frame, u, v);
+    cache.evaluated = true;
+  }
+  return cache.spot;
+}
+
+DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept {
+  ReliefCache& cache = hold(place.element);
+  cache.place.u = place.at[1];
+  cache.place.v = place.at[2];
+  const DescentEnd end = asperity::descend(*surface_, cache.place, spot, place.side(), goal);
+  cache.spot = spot;
+  cache.evaluated = true;
+  place.element = cache.place.frame.face;
+  place.at = {1.0 - cache.place.u - cache.place.v, cache.place.u, cache.place.v};
+  return end;
+}
+
+Mat3 ReliefView::bend(const Place& place, const ReliefPoint& spot) const noexcept {
+  const ShellPrism& prism = frame(place.element).prism;
+  const Vec3 direction = prism.direction_at(place.at[1], place.at[2]);
+  const HeightJet& h = spot.jet;
+  const double uu = spot.front.dot(h.uu * direction + 2.0 * h.u * prism.turn_u);
+  const double uv = spot.front.dot(h.uv * direction + h.u * prism.turn_v + h.v * prism.turn_u);
+  const double vv = spot.front.dot(h.vv * direction + 2.0 * h.v * prism.turn_v);
+  return shape_operator(spot.along_u, spot.along_v, uu, uv, vv);
+}
+
+}  // namespace asperity

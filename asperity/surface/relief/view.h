@@ -1,0 +1,78 @@
+#pragma once
+// A relief as one tick touches it, and walks along it.
+
+#include "asperity/surface/relief/surface.h"
+
+namespace asperity {
+
+/// Leads a place of a relief, touched from `side`, along it, across edges and round vertices; `spot` is the surface at
+/// `place`, before and after. [servo]
+DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
+                   const Goal& goal) noexcept;
+
+/// A relief at one moment of its coat: see SurfaceView. [servo]
+class ReliefView {
+ public:
+  using Spot = ReliefPoint;
+
+  ReliefView(const ReliefSurface& surface, const CoatMoment& moment, SurfaceCache& cache) noexcept
+      : surface_(&surface), moment_(moment), cache_(&cache) {}
+
+  /// No relief, however thin, is stepped over.
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
+  /// Whether folds overlap in space; and then what a point meets that slides from one place to another, of the rest:
+  /// what belongs to the faces of the two, or shares a vertex with one of them, is not met.
+  [[nodiscard]] bool overlaps() const noexcept { return surface_->overlaps(); }
+  [[nodiscard]] SweptHit between(const Place& from, const ReliefPoint& start, const Place& to, const ReliefPoint& end,
+                                 Sides sides) const noexcept;
+  /// Of the displaced surface. `normal` is that of the surface, turned towards p.
+  [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
+  [[nodiscard]] ReliefPoint at(const Place& place, const Vec3& normal = Vec3::Zero()) const noexcept;
+  [[nodiscard]] Vec3 front(const Foot& foot) const noexcept { return at(place_of(foot)).front; }
+  DescentEnd descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept;
+  bool launch(const Place& place, const ReliefPoint& spot, Vec3& from) const noexcept {
+    from = spot.point + place.side() * surface_->skin() * spot.front;
+    return true;
+  }
+  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p, *cache_, moment_); }
+  /// ReliefSurface::locate.
+  bool locate(const Vec3& p, ReliefFrame& frame, ShellPlace& place) const noexcept {
+    return surface_->locate(p, *cache_, moment_, frame, place);
+  }
+  /// The nearest point of the base mesh.
+  [[nodiscard]] Foot nearest_base(const Vec3& p) const noexcept {
+    return surface_->base().index().closest(p, infinity, cache_->patch);
+  }
+  [[nodiscard]] double skin() const noexcept { return surface_->skin(); }
+  [[nodiscard]] double grain() const noexcept { return surface_->grain(); }
+  [[nodiscard]] static bool has_folds() noexcept { return true; }
+  /// Distance from which the way to the nearest point tells the direction better than the surface's own normal does:
+  /// folds have none.
+  [[nodiscard]] double direction_from() const noexcept { return skin(); }
+  [[nodiscard]] std::uint32_t element(const Place& place, const ReliefPoint&) const noexcept { return place.element; }
+  [[nodiscard]] double height(const ReliefPoint& spot) const noexcept { return spot.jet.height; }
+  /// How the front normal changes along the surface at a place (1/m): symmetric, 0 along the normal.
+  [[nodiscard]] Mat3 bend(const Place& place, const ReliefPoint& spot) const noexcept;
+
+  [[nodiscard]] const ReliefSurface& surface() const noexcept { return *surface_; }
+  [[nodiscard]] const CoatMoment& moment() const noexcept { return moment_; }
+  /// The triangle of a place.
+  [[nodiscard]] const ReliefFrame& frame(std::uint32_t face) const noexcept { return hold(face).place.frame; }
+
+ private:
+  [[nodiscard]] ReliefCache& hold(std::uint32_t face) const noexcept;
+  [[nodiscard]] static Place place_of(const Foot& foot) noexcept { return {foot.element, false, foot.at}; }
+  template <class Skip>
+  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept;
+
+  const ReliefSurface* surface_;
+  CoatMoment moment_;
+  SurfaceCache* cache_;
+};
+static_assert(SurfaceView<ReliefView>);
+
+inline ReliefView ReliefSurface::view(SurfaceCache& cache, const CoatMoment& moment) const noexcept {
+  return {*this, moment, cache};
+}
+
+}  // namespace asperity
