@@ -49,6 +49,11 @@ struct Box {
   }
   /// Length of the diagonal (m); 0 for an empty box.
   [[nodiscard]] double diagonal() const { return empty() ? 0.0 : extent().norm(); }
+  [[nodiscard]] bool overlaps(const Box& other) const {
+    return (lower.array() <= other.upper.array()).all() && (other.lower.array() <= upper.array()).all();
+  }
+  /// From a point to the nearest of the box (m); 0 inside.
+  [[nodiscard]] double distance(const Vec3& p) const { return (p - p.cwiseMax(lower).cwiseMin(upper)).norm(); }
   /// The box grown by `margin` (m) on every side.
   [[nodiscard]] Box grown(double margin) const { return {lower.array() - margin, upper.array() + margin}; }
   /// The box around what `map` (Vec3 to Vec3, affine) makes of this one: around its eight corners. An empty box stays

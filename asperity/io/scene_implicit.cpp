@@ -228,7 +228,7 @@ class ImplicitReader {
     parts_.mesh = mesh_;
     Result<ImplicitSurface> built = ImplicitSurface::build(std::move(parts_));
     if (!built) return place_error(std::move(built).error());
-    note_limits(*built, instance.sides);
+    note_limits(*built, instance.sides.value_or(Sides::front));
     instance.surface = std::make_shared<const ImplicitSurface>(std::move(built).value());
     surface_.take("implicit", std::move(reader_));
     return success();

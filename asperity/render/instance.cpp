@@ -11,6 +11,14 @@ Box surface_bounds(const Surface& surface) {
   return std::visit([](const auto& s) { return s->bounds(); }, surface);
 }
 
+Sides natural_sides(const Surface& surface) noexcept {
+  if (implicit_of(surface) != nullptr) return Sides::front;
+  if (const ParametricSurface* parametric = parametric_of(surface)) return parametric->natural_sides();
+  if (const CustomSurface* custom = custom_of(surface)) return custom->natural_sides();
+  const MeshSurface* base = base_of(surface);
+  return base != nullptr ? base->natural_sides() : Sides::both;
+}
+
 const MeshSurface* base_of(const Surface& surface) noexcept {
   if (const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&surface)) return &(*relief)->base();
   if (const ImplicitSurface* implicit = implicit_of(surface)) return implicit->mesh();

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -57,6 +58,9 @@ const MeshSurface* base_of(const Surface& surface) noexcept;
 /// Tells apart what places are of: meshes by their lineage, which moving their vertices does not change, volumes by
 /// their field, the others by themselves. Never 0. [servo]
 std::uint64_t surface_identity(const Surface& surface) noexcept;
+/// Front where a surface tells front from back: a mesh that is closed and consistently oriented, a solid; both
+/// elsewhere. [any]
+Sides natural_sides(const Surface& surface) noexcept;
 /// The mesh of a surface that has one. [any]
 const TriangleMesh& base_mesh(const Surface& surface);
 
@@ -82,7 +86,8 @@ struct Instance {
   Material material = {};
   /// Texture, lay and maps of friction beside what is in the surface; nullptr: none.
   std::shared_ptr<const FineFeatures> fine = nullptr;
-  Sides sides = Sides::both;
+  /// That can be touched; nothing: as natural_sides tells.
+  std::optional<Sides> sides = {};
   Pose world_from_object = {};
   Motion motion = {};  ///< from there, by the clock of the probe
   double zoom = 1.0;   ///< filled by Scene::build: by how much a material that varies over the surface is magnified
@@ -95,6 +100,7 @@ struct Instance {
 /// What a tick asks of an instance again and again: found out when the scene is built.
 struct InstanceFacts {
   std::uint64_t identity = 0;   ///< surface_identity
+  Sides sides = Sides::both;    ///< that can be touched
   bool constrains = false;      ///< its law moves the proxy
   bool smooth = false;          ///< and leads it along the surface itself rather than along triangles
   bool facets = false;          ///< or along triangles that are generated in every tick

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "asperity/core/identity.h"
 #include "asperity/core/units.h"
@@ -298,6 +299,7 @@ InstanceFacts facts_of(const Instance& instance) {
   const Material& material = instance.material;
   InstanceFacts facts;
   facts.identity = surface_identity(instance.surface);
+  facts.sides = instance.sides.value_or(natural_sides(instance.surface));
   facts.constrains = constrains(instance.law);
   facts.smooth = follows_smoothly(instance);
   facts.facets = std::holds_alternative<GeneratedGeometryLaw>(instance.law);
@@ -383,8 +385,35 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
     for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
   }
   for (const Instance& instance : scene.felt_) scene.facts_.push_back(facts_of(instance));
+  std::vector<std::uint32_t> order(scene.bounds_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  scene.plant(order, 0, order.size());
   scene.epoch_ = next_identity();
   return scene;
+}
+
+/// Grows the tree over a part of the instances, halved along its longest side until few are left.
+void Scene::plant(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to) {
+  constexpr std::size_t few = 8;
+  if (to - from <= few) {
+    for (std::size_t i = from; i < to; ++i)
+      tree_.push_back({bounds_[order[i]], static_cast<std::uint32_t>(tree_.size() + 1), order[i]});
+    return;
+  }
+  Box all;
+  for (std::size_t i = from; i < to; ++i) all.include(bounds_[order[i]]);
+  int axis = 0;
+  all.extent().maxCoeff(&axis);
+  const std::size_t middle = (from + to) / 2;
+  const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::nth_element(at(from), at(middle), at(to), [&](std::uint32_t a, std::uint32_t b) {
+    return bounds_[a].lower[axis] + bounds_[a].upper[axis] < bounds_[b].lower[axis] + bounds_[b].upper[axis];
+  });
+  const std::size_t node = tree_.size();
+  tree_.push_back({all, 0, no_index});
+  plant(order, from, middle);
+  plant(order, middle, to);
+  tree_[node].past = static_cast<std::uint32_t>(tree_.size());
 }
 
 Box Scene::world_bounds() const noexcept {

@@ -60,6 +60,16 @@ class Scene {
   /// World bounds of instance `index`, coat and motion included (m). [servo]
   [[nodiscard]] const Box& world_bounds(std::size_t index) const noexcept { return bounds_[index]; }
   [[nodiscard]] Box world_bounds() const noexcept;
+  /// Calls visit(instance) for each whose world bounds meet `box`. [servo]
+  template <class Visit>
+  void for_each_in_box(const Box& box, Visit&& visit) const noexcept {
+    for (std::uint32_t i = 0; i < tree_.size();) {
+      const Node& node = tree_[i];
+      const bool near = node.box.overlaps(box);
+      if (near && node.instance != no_index) visit(node.instance);
+      i = near ? i + 1 : node.past;
+    }
+  }
   /// [servo]
   [[nodiscard]] const InstanceFacts& facts(std::size_t index) const noexcept { return facts_[index]; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
@@ -71,7 +81,16 @@ class Scene {
   std::vector<FieldEffect> felt_effects_;
   std::vector<Instance> given_;  ///< empty: they are felt as they are
   std::vector<FieldEffect> given_effects_;
+  /// Over the instances' bounds: a node stands before all that it holds.
+  struct Node {
+    Box box;
+    std::uint32_t past = 0;             ///< the first node that it does not hold
+    std::uint32_t instance = no_index;  ///< of a leaf
+  };
+  void plant(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to);
+
   std::vector<Box> bounds_;
+  std::vector<Node> tree_;
   std::vector<InstanceFacts> facts_;
   SceneSettings settings_;
   std::uint64_t epoch_ = 0;

@@ -11,9 +11,10 @@ namespace {
 constexpr int most_attempts = 4;
 // Between two walls a ball is pushed from one to the other, each time by less.
 constexpr int most_pushes = 12;
-// On a relief a move of this share of its finest grain is not worth making; on triangles near the corner of a valley
-// single moves can be a fraction of the skin long and still lead out of it.
+// On a relief a move of this share of its finest grain is not worth making, on what bends smoothly of this one; on
+// triangles near the corner of a valley single moves can be a fraction of the skin long and still lead out of it.
 constexpr double rest_of_grain = 2e-3;
+constexpr double rest_of_smooth_grain = 2e-4;
 constexpr double rest_of_skin = 1e-3;
 constexpr double rest_of_skin_beside_smooth = 0.05;
 // A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
@@ -40,12 +41,11 @@ void JointSolve::add(Touched& touch) noexcept {
     entry.direct = view.direction_from();
     entry.folds = view.has_folds();
   });
+  widest_skin_ = std::max(widest_skin_, entry.skin);
   entries_.push_back(entry);
   if (!entry.smooth) return;
   smooth_ = true;
-  margin_ = std::max({margin_, point_of_grain * entry.grain, 4.0 * entry.skin});
-  // What is thinner than a real ball must not slip past it; what is thinner than a blown-up point is below its skin.
-  if (radius_ > 0.25 * entry.grain) longest_step_ = std::min(longest_step_, 0.5 * radius_);
+  margin_ = std::max({margin_, entry.folds ? point_of_grain * entry.grain : 0.0, 4.0 * entry.skin});
 }
 
 bool JointSolve::complete() const noexcept {
@@ -71,7 +71,7 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
     entry.near.back = from_behind;
     return found;
   });
-  if (!foot.found() || (from_behind && touch.instance->sides == Sides::front)) return false;
+  if (!foot.found() || (from_behind && touch.facts->sides == Sides::front)) return false;
   // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
   // reached has no direction of its own, the surface's is taken.
   Vec3 normal = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
@@ -84,11 +84,39 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
 void JointSolve::remember(const ConstraintPlane& plane) noexcept {
   // One plane a direction: the newest.
   constexpr double same_direction = 0.999;
+  bool known = false;
   for (std::size_t i = feet_.size(); i-- > 0;) {
-    if (feet_[i].owner == plane.owner && feet_[i].normal.dot(plane.normal) > same_direction) feet_.swap_remove(i);
+    if (feet_[i].owner != plane.owner || !(feet_[i].normal.dot(plane.normal) > same_direction)) continue;
+    feet_.swap_remove(i);
+    known = true;
   }
   if (feet_.size() == feet_.capacity()) feet_.swap_remove(0);
+  met_ = met_ || !known;
   feet_.push_back(plane);
+}
+
+double JointSolve::distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept {
+  return (position - entries_[plane.owner].touch->to_world(plane.contact.point)).norm();
+}
+
+ConstraintPlane JointSolve::plane_of(const Entry& entry, const Foot& contact) const noexcept {
+  const Vec3 normal = entry.touch->turned(contact.normal);
+  return {normal, normal.dot(entry.touch->to_world(contact.point)) + radius_, gap(entry),
+          static_cast<std::uint32_t>(&entry - entries_.begin()), contact};
+}
+
+/// What of its triangles the ball touches.
+void JointSolve::triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept {
+  Entry& entry = entries_[index];
+  const Touched& touch = *entry.touch;
+  const Vec3 local = touch.to_local(position);
+  ContactSet contacts;
+  if (entry.patch != nullptr) {
+    entry.patch->contacts(local, radius_ + margin_, touch.facts->sides, contacts);
+  } else {
+    std::get_if<TriangleView>(&touch.view)->contacts(local, radius_ + margin_, touch.facts->sides, contacts);
+  }
+  for (const Foot& contact : contacts) out.push_back(plane_of(entry, contact));
 }
 
 void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
@@ -102,19 +130,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
       if (!entry.folds) out.push_back(plane);
       continue;
     }
-    const Touched& touch = *entry.touch;
-    const Vec3 local = touch.to_local(position);
-    ContactSet contacts;
-    if (entry.patch != nullptr) {
-      entry.patch->contacts(local, radius_ + margin_, touch.instance->sides, contacts);
-    } else {
-      std::get_if<TriangleView>(&touch.view)->contacts(local, radius_ + margin_, touch.instance->sides, contacts);
-    }
-    for (const Foot& contact : contacts) {
-      const Vec3 normal = touch.turned(contact.normal);
-      out.push_back({normal, normal.dot(touch.to_world(contact.point)) + radius_, gap(entry),
-                     static_cast<std::uint32_t>(i), contact});
-    }
+    triangle_planes(i, position, out);
   }
   for (std::size_t i = feet_.size(); i-- > 0;) {
     const ConstraintPlane& plane = feet_[i];
@@ -122,68 +138,104 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
     for (const ConstraintPlane& other : out)
       known = known || (other.owner == plane.owner && other.normal == plane.normal);
     if (known) continue;
-    const double apart = plane.normal.dot(position) - plane.offset - plane.skin;
-    const Vec3 foot = entries_[plane.owner].touch->to_world(plane.contact.point);
-    // Feet found on the way stay as long as the ball is about as near to them as their surface bends.
+    // Feet found on the way stay about as long as their surface bends.
     const double around = radius_ + plane.skin;
-    if (apart > 0.1 * around || (position - foot).squaredNorm() > 2.0 * around * around) {
-      feet_.swap_remove(i);
-    } else {
+    if (plane.normal.dot(position) - plane.offset - plane.skin <= 0.1 * around + stride_ &&
+        distance_to_foot(plane, position) <= 1.4 * around + stride_) {
       out.push_back(plane);
+    } else {
+      feet_.swap_remove(i);
     }
   }
 }
 
+/// How far a ball may go so that its centre stays half of it away from a smooth surface: from there it can be pushed
+/// back to where it came from. As far each time as nothing is near.
+double JointSolve::free_share_of_ball(Entry& entry, const Segment& motion) noexcept {
+  constexpr int most_strides = 32;
+  const Vec3 way = motion.to - motion.from;
+  const double length = way.norm();
+  const double inner = 0.5 * (radius_ + margin_);
+  double gone = 0.0;
+  for (int stride = 0; stride < most_strides; ++stride) {
+    const Vec3 here = motion.from + gone / length * way;
+    const Foot foot = on_smooth_view(entry.touch->view, [&](const auto& view) {
+      const Foot found = view.nearest(here, length - gone + inner, entry.near);
+      if (found.found()) entry.near = {found.element, false, found.at};
+      return found;
+    });
+    if (!foot.found()) return 1.0;
+    const double free = foot.distance - inner;
+    if (gone + free >= length) return 1.0;
+    if (free < 1e-3 * inner) break;
+    gone += free;
+  }
+  return gone / length;
+}
+
 double JointSolve::free_share(const Segment& motion) noexcept {
   double share = 1.0;
+  const double length = (motion.to - motion.from).norm();
+  if (length == 0.0) return share;
   for (Entry& entry : entries_) {
     const Touched& touch = *entry.touch;
-    const Sides sides = touch.instance->sides;
+    const Sides sides = touch.facts->sides;
     const Segment local = touch.to_local(motion);
     if (entry.patch != nullptr) {
       share = std::min(share, entry.patch->segment(local, radius_ + margin_, sides).t);
     } else if (!entry.smooth) {
-      share = std::min(share, std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin_, sides).t);
+      const SweptHit hit = std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin_, sides);
+      share = std::min(share, hit.t);
+      // What stops it may be farther off than what counts as touched.
+      if (smooth_ && hit.hit && hit.t < 1.0) remember(plane_of(entry, hit.contact));
     } else {
       const SweptHit hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
       // The centre itself must stay outside: half of the ball before what it meets.
-      const double length = (motion.to - motion.from).norm();
       if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin_) / length));
+      // What is thinner than a real ball must not slip past it; what is thinner than a blown-up point is below its
+      // skin.
+      if (radius_ > 0.25 * entry.grain) share = std::min(share, free_share_of_ball(entry, local));
     }
   }
   return share;
 }
 
-Vec3 JointSolve::pushed_out(Vec3 position, bool& clear) noexcept {
-  clear = false;
-  for (int push = 0; push < most_pushes && !clear; ++push) {
-    clear = true;
+bool JointSolve::push_out(Vec3& position) noexcept {
+  PlaneSet held;
+  for (int push = 0; push < most_pushes; ++push) {
+    bool clear = true;
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       if (!entries_[i].smooth) continue;
       ConstraintPlane plane;
       if (!foot_plane(i, position, plane)) continue;
       remember(plane);
-      const double missing = plane.offset + plane.skin - plane.normal.dot(position);
-      if (missing <= 0.25 * entries_[i].skin) continue;
-      position += missing * plane.normal;
+      if (plane.offset + plane.skin - plane.normal.dot(position) <= 0.25 * entries_[i].skin) continue;
+      if (held.size() == held.capacity()) return false;
+      held.push_back(plane);
       clear = false;
     }
+    if (clear) return true;
+    const Vec3 out = project_onto_planes(position, held, true).point;
+    const double share = free_share({position, out});
+    position += share * (out - position);
+    // Between walls it is led along all of them.
+    if (share < 1.0) {
+      for (std::size_t i = 0; i < entries_.size(); ++i) {
+        if (!entries_[i].smooth) triangle_planes(i, position, held);
+      }
+    }
   }
-  return position;
+  return false;
 }
 
 /// Along the step and out of what is met there, or along a part of it. False when no part of it comes nearer.
 bool JointSolve::advance(const Vec3& whole, const Vec3& goal, Vec3& proxy) noexcept {
   Vec3 step = whole;
-  const double length = step.norm();
-  if (length > longest_step_) step *= longest_step_ / length;
+  met_ = false;
   const double distance = (proxy - goal).norm();
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     Vec3 next = proxy + free_share({proxy, proxy + step}) * step;
-    bool clear = false;
-    const Vec3 out = pushed_out(next, clear);
-    if (out != next) next += free_share({next, out}) * (out - next);
-    if (clear && (next - goal).norm() < distance - 1e-2 * tolerance_) {
+    if (push_out(next) && (next - goal).norm() < distance - 1e-2 * tolerance_) {
       proxy = next;
       return true;
     }
@@ -193,20 +245,35 @@ bool JointSolve::advance(const Vec3& whole, const Vec3& goal, Vec3& proxy) noexc
   return false;
 }
 
+/// Forgets feet whose planes hold the ball, but not where it is. False where there were none.
+bool JointSolve::loosen(const Vec3& position) noexcept {
+  stride_ = 0.0;
+  const std::size_t before = feet_.size();
+  for (std::size_t i = before; i-- > 0;) {
+    const double around = radius_ + feet_[i].skin;
+    const double off = 1e-3 * around + tolerance_;
+    if (feet_[i].normal.dot(position) - feet_[i].offset - feet_[i].skin <= off &&
+        distance_to_foot(feet_[i], position) > around + off)
+      feet_.swap_remove(i);
+  }
+  return feet_.size() < before;
+}
+
 ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcept {
   // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
   // either side is left before the other is felt; and a ball right above the edge it rolls over may stop, or roll in
   // larger steps.
   constexpr int patience = 8;
   constexpr double least_gain = 1e-6;
-  const int most_moves = smooth_ ? 16 : 64;
+  const int most_moves = smooth_ ? 160 : 64;
   tolerance_ = infinity;
   for (const Entry& entry : entries_) {
     if (!smooth_) {
       tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);
       continue;
     }
-    const double rest = entry.smooth ? rest_of_grain * entry.grain : rest_of_skin_beside_smooth * entry.skin;
+    const double rest = entry.smooth ? (entry.folds ? rest_of_grain : rest_of_smooth_grain) * entry.grain
+                                     : rest_of_skin_beside_smooth * entry.skin;
     tolerance_ = tolerance_ == infinity ? rest : std::max(tolerance_, rest);
   }
   ConstraintSolution solution;
@@ -214,6 +281,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
   PlaneSet earlier;
   double distance = infinity;
   double stride = 1.0;
+  Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
   for (int move = 0; move < most_moves; ++move) {
     const bool patient = !smooth_ && move >= patience;
     if (patient) earlier = solution.planes;
@@ -228,16 +296,24 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
     if (rolling) target = rolling_target(solution.planes[0], foot, goal, target);
     Vec3 step = target - solution.proxy;
     if (step.norm() <= tolerance_) {
+      if (smooth_ && loosen(solution.proxy)) continue;
       // Without contact nothing may remain between proxy and probe: free space gives no force at all.
       if (solution.planes.empty()) solution.proxy = target;
       solution.converged = true;
       break;
     }
     if (smooth_) {
-      // No motion comes nearer: a local minimum, found by trying.
-      solution.converged = !advance(step, goal, solution.proxy);
-      if (solution.converged) break;
-      continue;
+      stride_ = step.norm();
+      if (advance(step, goal, solution.proxy)) {
+        refused = Vec3::Constant(infinity);
+        continue;
+      }
+      // No motion comes nearer: a local minimum, found by trying, if all that holds it there is known and is there.
+      const bool again = (target - refused).norm() > tolerance_ && (met_ || loosen(solution.proxy));
+      refused = target;
+      if (again) continue;
+      solution.converged = true;
+      break;
     }
     if (rolling && patient) {
       if ((goal - foot).dot(solution.planes[0].normal) < 0.0) {
@@ -258,7 +334,37 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
     solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
   }
   solution.projection = project_onto_planes(goal, solution.planes, false);
+  // Planes that would have it elsewhere are not all that holds it.
+  constexpr double most_gaps = 100.0;
+  if (smooth_ &&
+      (solution.projection.point - solution.proxy).norm() > most_gaps * (margin_ + widest_skin_) + tolerance_)
+    solution.converged = false;
+  if (!solution.settled()) share_out(goal, solution);
   return solution;
+}
+
+/// Of a proxy that is not at rest: what each of the planes around it would hold where it is now.
+void JointSolve::share_out(const Vec3& goal, ConstraintSolution& solution) noexcept {
+  const Vec3& proxy = solution.proxy;
+  stride_ = 0.0;
+  solution.planes.clear();
+  touched(proxy, solution.planes);
+  for (ConstraintPlane& plane : solution.planes) plane.offset = plane.normal.dot(proxy);
+  solution.projection = project_onto_planes(goal, solution.planes, false);
+  solution.projection.feasible = false;
+  if (!solution.projection.active.empty() || proxy == goal || entries_.empty()) return;
+  // Between two moves it touches nothing: what it met last is in its way, if anything is.
+  const std::size_t owner = feet_.empty() ? 0 : feet_[feet_.size() - 1].owner;
+  const Touched& touch = *entries_[owner].touch;
+  const double way = (proxy - goal).norm();
+  const Foot foot = on_view(touch.view, [&](const auto& view) {
+    return view.nearest(touch.to_local(proxy), way + radius_ + gap(entries_[owner]), entries_[owner].near);
+  });
+  if (!foot.found()) return;
+  const Vec3 normal = (proxy - goal) / way;
+  solution.planes.clear();
+  solution.planes.push_back({normal, normal.dot(proxy), 0.0, static_cast<std::uint32_t>(owner), foot});
+  solution.projection.active.push_back({0, way});
 }
 
 void JointSolve::remember_places(std::size_t index, const ConstraintSolution& solution) noexcept {
@@ -350,10 +456,12 @@ LawForce owner_force(const Touched& touch, const Material& material, std::size_t
   answer.normal = spring / answer.penetration;
   answer.force = material.stiffness * spring;
   // Not at rest yet: the spring runs to where the proxy really is.
-  const bool settled = solution.converged && solution.projection.feasible;
-  // Once: by the owner that pushes most.
-  if (!settled && strongest != strongest_of_all) return {};
-  if (!settled) answer.force = material.stiffness * (solution.proxy - goal);
+  if (!solution.settled() && strongest == strongest_of_all) {
+    Vec3 rest = solution.proxy - goal;
+    for (const PlaneProjection::Active& active : solution.projection.active)
+      rest -= active.multiplier * solution.planes[active.plane].normal;
+    answer.force += material.stiffness * rest;
+  }
   if (const auto* law = std::get_if<ForceShadingLaw>(&touch.instance->law)) shade(touch, *law, plane->contact, answer);
   if (strongest == strongest_of_all) answer.force += material.stiffness * (goal - probe.pose.position);
   answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);

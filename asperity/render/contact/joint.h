@@ -31,9 +31,9 @@ class JointSolve {
   template <class FrictionOf>
   ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
                                          const FrictionOf& friction_of) noexcept;
-  /// Where the ball is pushed out of smooth surfaces that it overlaps; `clear` tells whether it overlaps none any more.
+  /// Pushes the ball out of smooth surfaces that it overlaps, past nothing else; whether it overlaps none any more.
   /// [servo]
-  [[nodiscard]] Vec3 pushed_out(Vec3 position, bool& clear) noexcept;
+  [[nodiscard]] bool push_out(Vec3& position) noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
   [[nodiscard]] Touched& touch(std::size_t index) const noexcept { return *entries_[index].touch; }
@@ -57,9 +57,15 @@ class JointSolve {
   [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin_ + entry.skin; }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
+  [[nodiscard]] ConstraintPlane plane_of(const Entry& entry, const Foot& contact) const noexcept;
+  void triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
+  [[nodiscard]] double free_share_of_ball(Entry& entry, const Segment& motion) noexcept;
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
+  void share_out(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember(const ConstraintPlane& plane) noexcept;
+  [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
+  [[nodiscard]] bool loosen(const Vec3& position) noexcept;
   [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept {
     return radius_ > 0.0 && plane.contact.at.minCoeff() <= 0.0;
   }
@@ -67,11 +73,13 @@ class JointSolve {
   double radius_;
   GeneratedPatches* patches_;
   FixedVector<Entry, most_contacts> entries_;
-  FixedVector<ConstraintPlane, 6> feet_;  ///< of smooth surfaces, found while the ball moved
+  FixedVector<ConstraintPlane, 6> feet_;  ///< found while the ball moved
+  bool met_ = false;                      ///< the last advance has found more of them
+  double stride_ = 0.0;                   ///< how far that was to go (m)
   bool smooth_ = false;                   ///< any of them is
   double margin_ = 0.0;          ///< by which the ball is blown up, so that a point has a surface of its own (m)
+  double widest_skin_ = 0.0;     ///< m
   double tolerance_ = infinity;  ///< below which a further move is not worth making (m)
-  double longest_step_ = infinity;
 };
 
 /// The coefficients and the normal that friction on several planes goes by: those of the one that pushes most.

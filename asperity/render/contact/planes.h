@@ -46,6 +46,8 @@ struct ConstraintSolution {
   PlaneSet planes;             ///< touched at `proxy`
   PlaneProjection projection;  ///< of the probe onto `planes`, without skin
   bool converged = false;
+  /// Whether the planes explain all of where the proxy is.
+  [[nodiscard]] bool settled() const noexcept { return converged && projection.feasible; }
 };
 
 /// Where a ball that rests on one edge or corner is led: onto the ray from there to the goal. The edge's offset is

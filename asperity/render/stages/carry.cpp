@@ -110,8 +110,8 @@ double free_share(const Tick& tick, const Touched& touch, const Segment& motion)
   const Segment local{touch.pose->apply_inverse(motion.from), touch.pose->apply_inverse(motion.to)};
   const FeltView view = felt_view(touch);
   if (const auto* mesh = std::get_if<TriangleView>(&view))
-    return mesh->sweep(local, tick.scene.probe_radius(), instance.sides).t;
-  return on_smooth_view(view, [&](const auto& smooth) { return smooth.first_touch(local, instance.sides); }).t;
+    return mesh->sweep(local, tick.scene.probe_radius(), touch.facts->sides).t;
+  return on_smooth_view(view, [&](const auto& smooth) { return smooth.first_touch(local, touch.facts->sides); }).t;
 }
 
 /// A proxy that is carried from one place to another stops at what else is there.
@@ -239,7 +239,7 @@ bool follow_surfaces(Tick& tick) noexcept {
     const Instance& instance = *touch.instance;
     const std::optional<bool>& outside = touch.contact->outside;
     if (!touch.facts->constrains || &touch == mover || !outside || !(touch.moved || tick.changed)) continue;
-    if (instance.sides == Sides::front && !*outside) continue;
+    if (touch.facts->sides == Sides::front && !*outside) continue;
     const Vec3 local = touch.pose->apply_inverse(state.proxy);
     if (in_front(touch, local) == *outside || beside_rim(touch, local)) continue;
     state.proxy = pushed_to_front(tick, touch, *outside, state.proxy);
@@ -260,7 +260,7 @@ void carry(Tick& tick) noexcept {
   // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
   if (tick.changed && state.stiffness > 0.0) {
     for (const Touched& touch : tick.touches) {
-      if (touch.instance->sides == Sides::front && touch.facts->constrains && !touch.contact->surface.rests)
+      if (touch.facts->sides == Sides::front && touch.facts->constrains && !touch.contact->surface.rests)
         state.proxy = pushed_to_front(tick, touch, true, state.proxy);
     }
   }
@@ -271,7 +271,7 @@ void carry(Tick& tick) noexcept {
     if (touch.facts->volume) {
       const IsoSurface* iso = iso_of(instance.surface);
       const int level = std::min(tick.level, iso->field().levels() - 1);
-      if (felt_level(*iso, ball_level(instance, tick.scene), instance.sides, level, tick.dt,
+      if (felt_level(*iso, ball_level(instance, tick.scene), touch.facts->sides, level, tick.dt,
                      touch.pose->apply_inverse(state.proxy), *touch.cache, contact.surface))
         tick.surfaces_moved = true;
     } else if (tick.changed || contact.surface.identity == 0) {

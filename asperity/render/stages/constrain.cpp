@@ -67,7 +67,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   const Friction friction = friction_of(touch, material_there(touch, place, room));
   const bool rested = surface.rests;
   const bool slid = surface.sliding;
-  PointProxy<View> point(view, instance.sides, friction, touch.to_local(position), surface);
+  PointProxy<View> point(view, touch.facts->sides, friction, touch.to_local(position), surface);
   const PointRest rest = point.run(from);
   if (!rest.simple) {
     surface.rests = rested;
@@ -152,8 +152,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
           2.0 * on_view(touch.view, [](const auto& view) { return view.skin(); }) * touch.pose->rotate(surface.normal);
     surface.rests = false;
   }
-  bool clear = false;
-  if (smooth && tick.surfaces_moved) from = joint.pushed_out(from, clear);
+  if (smooth && tick.surfaces_moved) static_cast<void>(joint.push_out(from));
   const auto friction_in = [&](std::uint32_t owner) {
     const Touched& touch = joint.touch(owner);
     std::optional<Material> room;
@@ -170,8 +169,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   state.proxy = solution.proxy;
   tick.converged = solution.converged && joint.complete();
   // While friction holds it, the proxy is where it is, not where the goal would have it.
-  const bool settled = solution.converged && solution.projection.feasible;
-  tick.felt = settled ? Vec3(solution.projection.point) : solution.proxy;
+  tick.felt = solution.settled() ? Vec3(solution.projection.point) : solution.proxy;
   for (std::size_t i = 0; i < joint.size(); ++i) {
     Touched& touch = joint.touch(i);
     std::optional<Material> room;

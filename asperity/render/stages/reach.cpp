@@ -7,10 +7,6 @@ namespace asperity {
 
 namespace {
 
-bool overlap(const Box& a, const Box& b) noexcept {
-  return (a.lower.array() <= b.upper.array()).all() && (b.lower.array() <= a.upper.array()).all();
-}
-
 /// How far a moving instance may carry a proxy within a tick (m).
 double farthest_carried(const Scene& scene, const Vec3& proxy, Seconds dt) noexcept {
   if (!scene.moves()) return 0.0;
@@ -25,26 +21,91 @@ double farthest_carried(const Scene& scene, const Vec3& proxy, Seconds dt) noexc
   return farthest;
 }
 
-/// Keeps one contact for each instance that the tick's motion can reach. False when there were too few.
-bool keep_contacts(const Scene& scene, ProxyState& state, const Box& around) noexcept {
-  for (std::size_t i = state.contacts.size(); i-- > 0;) {
-    const Contact& contact = state.contacts[i];
-    // Under a thin sheet a pressed probe is far outside the sheet's own bounds, and still in contact.
-    if (!contact.touching && !overlap(scene.world_bounds(contact.instance), around)) state.contacts.swap_remove(i);
-  }
-  bool all = true;
-  for (std::uint32_t instance = 0; instance < scene.felt().size(); ++instance) {
-    if (!overlap(scene.world_bounds(instance), around)) continue;
-    bool held = false;
-    for (const Contact& contact : state.contacts) held = held || contact.instance == instance;
-    if (held) continue;
-    if (Contact* contact = state.contacts.emplace_back()) {
-      contact->instance = instance;
-    } else {
-      all = false;
+/// The instances that a motion can reach, nearest first as far as there is room.
+class Reached {
+ public:
+  Reached(const Scene& scene, const ProxyState& state, const Vec3& probe) noexcept
+      : scene_(scene), state_(state), probe_(probe) {}
+
+  void visit(std::uint32_t instance) noexcept {
+    ++met_;
+    if (near_.size() < most_contacts && met_ <= most_contacts) {
+      near_.push_back({instance, -1.0});
+      return;
     }
+    // Only now does it matter how near they are.
+    if (met_ == most_contacts + 1) {
+      for (Near& one : near_) one.distance = distance(one.instance, infinity);
+    }
+    Near* farthest = &near_[0];
+    for (Near& one : near_) farthest = one.distance > farthest->distance ? &one : farthest;
+    const double there = distance(instance, farthest->distance);
+    nearest_left_ = std::min(nearest_left_, farthest->distance);
+    if (there < farthest->distance) *farthest = {instance, there};
   }
-  return all;
+  template <class Visit>
+  void for_each(Visit&& visit) const noexcept {
+    for (const Near& one : near_) visit(one.instance);
+  }
+  /// Whether there was room for all that a tip of that radius may touch on its way.
+  [[nodiscard]] bool all(double radius) const noexcept {
+    return nearest_left_ > radius + 0.5 * (state_.proxy - probe_).norm();
+  }
+  [[nodiscard]] bool holds(std::uint32_t instance) const noexcept {
+    return std::any_of(near_.begin(), near_.end(), [&](const Near& one) { return one.instance == instance; });
+  }
+
+ private:
+  struct Near {
+    std::uint32_t instance;
+    double distance;
+  };
+  /// Of the motion's ends from the surface, or as near as its bounds tell (m); what is touched is nearest of all.
+  [[nodiscard]] double distance(std::uint32_t instance, double bound) const noexcept {
+    for (const Contact& contact : state_.contacts) {
+      if (contact.instance == instance && contact.touching) return -1.0;
+    }
+    const Box& box = scene_.world_bounds(instance);
+    const double off = std::min(box.distance(state_.proxy), box.distance(probe_));
+    const Instance& one = scene_.felt()[instance];
+    const MeshSurface* base = base_of(one.surface);
+    if (!(off < bound) || base == nullptr || one.motion.moves()) return off;
+    const ReliefSurface* relief = relief_of(one);
+    const double coat = relief == nullptr ? 0.0 : relief->reach();
+    double least = infinity;
+    for (const Vec3& p : {state_.proxy, probe_}) {
+      const Foot foot = base->index().closest(one.world_from_object.apply_inverse(p), std::min(least, bound + coat));
+      if (foot.found()) least = foot.distance;
+    }
+    return std::max(off, least - coat);
+  }
+
+  const Scene& scene_;
+  const ProxyState& state_;
+  const Vec3& probe_;
+  FixedVector<Near, most_contacts> near_;
+  std::size_t met_ = 0;
+  double nearest_left_ = infinity;  ///< m: of those without room
+};
+
+/// Keeps one contact for each instance that the tick's motion can reach. False when there were too few.
+bool keep_contacts(const Scene& scene, ProxyState& state, const Vec3& probe, const Box& around) noexcept {
+  Reached reached(scene, state, probe);
+  // Under a thin sheet a pressed probe is far outside the sheet's own bounds, and still in contact.
+  for (const Contact& contact : state.contacts) {
+    if (contact.touching && !scene.world_bounds(contact.instance).overlaps(around)) reached.visit(contact.instance);
+  }
+  scene.for_each_in_box(around, [&](std::uint32_t instance) { reached.visit(instance); });
+  for (std::size_t i = state.contacts.size(); i-- > 0;) {
+    if (!reached.holds(state.contacts[i].instance)) state.contacts.swap_remove(i);
+  }
+  reached.for_each([&](std::uint32_t instance) {
+    for (const Contact& contact : state.contacts) {
+      if (contact.instance == instance) return;
+    }
+    state.contacts.emplace_back()->instance = instance;
+  });
+  return reached.all(scene.probe_radius());
 }
 
 /// The finest level at which all volumes are in memory around the probe; one for all of them, so that a replay can ask
@@ -74,7 +135,7 @@ void reach(Tick& tick) noexcept {
   around = around.grown((state.proxy - position).norm());
   around.include(state.previous_probe);
   around = around.grown(scene.probe_radius() + farthest_carried(scene, state.proxy, tick.dt));
-  if (!keep_contacts(scene, state, around)) tick.out.flags.set(TickFlag::contacts_dropped);
+  if (!keep_contacts(scene, state, position, around)) tick.out.flags.set(TickFlag::contacts_dropped);
   for (Contact& contact : state.contacts) {
     tick.touches.push_back(
         {&scene.felt()[contact.instance], &scene.facts(contact.instance), &contact, &tick.cache.of(contact.instance)});

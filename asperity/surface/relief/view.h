@@ -47,8 +47,8 @@ class ReliefView {
   [[nodiscard]] double grain() const noexcept { return surface_->grain(); }
   [[nodiscard]] static bool has_folds() noexcept { return true; }
   /// Distance from which the way to the nearest point tells the direction better than the surface's own normal does:
-  /// folds have none.
-  [[nodiscard]] double direction_from() const noexcept { return skin(); }
+  /// folds have none. Nearest points are found to about a skin, sideways too.
+  [[nodiscard]] double direction_from() const noexcept { return 4.0 * skin(); }
   [[nodiscard]] std::uint32_t element(const Place& place, const ReliefPoint&) const noexcept { return place.element; }
   [[nodiscard]] double height(const ReliefPoint& spot) const noexcept { return spot.jet.height; }
   /// How the front normal changes along the surface at a place (1/m): symmetric, 0 along the normal.

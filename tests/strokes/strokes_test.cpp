@@ -1,0 +1,301 @@
+// Random strokes over random pairs and triples of bodies of every provider, by a point and by balls, at 0.01 to 5 m/s:
+// the proxy is never inside of anything, never held by nothing, and never gone where something should hold it.
+//   ASPERITY_STROKES       how many ticks (default: a million, over all)
+//   ASPERITY_STROKES_SEED  default: changes with the date; every failure tells its own
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <map>
+#include <sstream>
+
+#include "tests/strokes/bodies.h"
+
+namespace asperity::strokes {
+
+namespace {
+
+double number_in(const char* variable, double otherwise) {
+  const char* text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::strtod(text, nullptr);
+}
+
+std::uint64_t seed_of_the_day() {
+  const auto days = std::chrono::duration_cast<std::chrono::hours>(std::chrono::system_clock::now().time_since_epoch());
+  return static_cast<std::uint64_t>(number_in("ASPERITY_STROKES_SEED", static_cast<double>(days.count() / 24)));
+}
+
+Vec3 random_in_ball(Rng& rng) {
+  for (;;) {
+    const Vec3 v = test::random_vector(rng, 1.0);
+    if (v.squaredNorm() <= 1.0) return v;
+  }
+}
+
+Pose random_pose(Rng& rng, const Vec3& position) {
+  Pose pose;
+  pose.position = position;
+  pose.orientation = Quat(Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_direction(rng)));
+  return pose;
+}
+
+/// What a hand draws its strokes over, and what judges them.
+class Bodies {
+ public:
+  Bodies(Rng& rng, std::size_t count, double radius, double friction) : radius_(radius) {
+    for (std::size_t i = 0; i < count; ++i) {
+      Body body = makers()[rng.below(static_cast<std::uint32_t>(makers().size()))](rng);
+      Vec3 at = Vec3::Zero();
+      if (i > 0) {
+        // Around a place on the surfaces so far: overlapping, touching, sunk or nested.
+        const Vec3 on = on_surface(rng, Vec3::Zero(), bodies_[0].size);
+        at = on + rng.uniform(0.0, 1.0) * body.size * random_in_ball(rng);
+        junction_ = on;
+      }
+      body.instance.material.static_friction = 1.2 * friction;
+      body.instance.material.dynamic_friction = friction;
+      bodies_.push_back(placed(std::move(body), random_pose(rng, at)));
+      error_ = std::max(error_, bodies_.back().error);
+    }
+    if (count == 1) junction_ = on_surface(rng, Vec3::Zero(), bodies_[0].size);
+    std::vector<Instance> instances;
+    for (const Body& body : bodies_) instances.push_back(body.instance);
+    scene_.emplace(test::must(Scene::build(std::move(instances), radius)));
+  }
+
+  [[nodiscard]] const Scene& scene() const { return *scene_; }
+  [[nodiscard]] const Vec3& junction() const { return junction_; }
+  [[nodiscard]] double error() const { return error_; }
+  /// How far the tip at `p` is outside of all of them (m).
+  [[nodiscard]] double clearance(const Vec3& p) const {
+    double least = infinity;
+    for (const Body& body : bodies_) least = std::min(least, body.distance(p));
+    return least - radius_;
+  }
+  /// A place where the clearance is `depth` below 0, on the way from anywhere around `centre`.
+  [[nodiscard]] Vec3 at_clearance(Rng& rng, const Vec3& centre, double around, double wanted) const {
+    const Vec3 start = centre + around * random_in_ball(rng);
+    Vec3 p = start;
+    for (int i = 0; i < 12; ++i) {
+      const double missing = wanted - clearance(p);
+      if (std::abs(missing) < 1e-5) break;
+      p += missing * slope(p);
+    }
+    return p;
+  }
+  [[nodiscard]] Vec3 on_surface(Rng& rng, const Vec3& centre, double around) const {
+    return at_clearance(rng, centre, around, 0.0);
+  }
+  /// Where a hand at `probe` goes next: nowhere on the way very deep, for there what is nearest says little.
+  [[nodiscard]] Vec3 target(Rng& rng, const Vec3& probe) const {
+    constexpr double deepest = 2e-3;
+    for (int attempt = 0; attempt < 100; ++attempt) {
+      const Vec3 target = at_clearance(rng, junction_, 4e-3, rng.uniform(-deepest, 0.5e-3));
+      bool shallow = true;
+      for (int i = 1; i <= 8 && shallow; ++i)
+        shallow = clearance(probe + 0.125 * i * (target - probe)) > -1.2 * deepest;
+      if (shallow) return target;
+    }
+    return probe + 1e-4 * random_in_ball(rng);
+  }
+  /// Where a tip that starts at `from` comes to when it is led towards `goal` in small strides past nothing.
+  [[nodiscard]] Vec3 led(Vec3 from, const Vec3& goal, double stride = 50e-6, double enough = infinity,
+                         double slope_asked = 1e-3) const {
+    double left = (from - goal).norm();
+    enough = left - enough;
+    const double least = std::min(1e-7, 0.1 * stride);
+    for (int i = 0; i < 400 && stride > least; ++i) {
+      Vec3 next = from + std::min(1.0, stride / left) * (goal - from);
+      bool clear = false;
+      for (int push = 0; push < 30 && !clear; ++push) {
+        clear = true;
+        for (const Body& body : bodies_) {
+          const double inside = radius_ - body.distance(next);
+          if (inside <= 1e-8) continue;
+          clear = false;
+          next += inside * slope(body, next);
+        }
+      }
+      const double now = (next - goal).norm();
+      if (clear && now < left - slope_asked * stride) {
+        from = next;
+        left = now;
+      } else {
+        stride *= 0.5;
+      }
+      if (left < std::max(1e-7, enough)) break;
+    }
+    return from;
+  }
+  /// Whether friction may hold a tip at `p`: between several bodies it may, on one of them within its cone.
+  [[nodiscard]] bool may_stick(const Vec3& p, const Vec3& goal, double coefficient) const {
+    const Body* only = nullptr;
+    for (const Body& body : bodies_) {
+      if (body.distance(p) - radius_ > 50e-6) continue;
+      if (only != nullptr) return true;
+      only = &body;
+    }
+    if (only == nullptr) return false;
+    const Vec3 normal = slope(*only, p);
+    const double push = (p - goal).dot(normal);
+    return (p - goal - push * normal).norm() <= 1.5 * coefficient * push;
+  }
+  /// Of each body.
+  [[nodiscard]] std::string clearances(const Vec3& p) const {
+    std::ostringstream text;
+    for (const Body& body : bodies_) text << " " << body.distance(p) - radius_;
+    return text.str();
+  }
+  [[nodiscard]] std::string told() const {
+    std::string text;
+    for (const Body& body : bodies_) text += body.name + " ";
+    return text;
+  }
+
+ private:
+  template <class F>
+  static Vec3 slope_of(const F& f, const Vec3& p) {
+    Vec3 g;
+    for (int k = 0; k < 3; ++k) g[k] = f(p + 1e-7 * Vec3::Unit(k)) - f(p - 1e-7 * Vec3::Unit(k));
+    const double length = g.norm();
+    return length > 0.0 ? Vec3(g / length) : Vec3::UnitZ();
+  }
+  [[nodiscard]] Vec3 slope(const Vec3& p) const {
+    return slope_of([&](const Vec3& q) { return clearance(q); }, p);
+  }
+  static Vec3 slope(const Body& body, const Vec3& p) { return slope_of(body.distance, p); }
+
+  std::vector<Body> bodies_;
+  std::optional<Scene> scene_;
+  Vec3 junction_ = Vec3::Zero();
+  double radius_ = 0.0;
+  double error_ = 0.0;
+};
+
+struct Tally {
+  std::uint64_t ticks = 0;
+  std::uint64_t touching = 0;
+  std::uint64_t through = 0;
+  std::uint64_t lost = 0;
+  std::uint64_t stuck = 0;
+  std::uint64_t asked = 0;  ///< of the oracle that leads a tip
+};
+
+/// One stroke of many; answers what was wrong first, or nothing.
+std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally) {
+  const double tolerance = 5e-6 + bodies.error();
+  ProxyState state;
+  ProxyCache cache;
+  std::string wrong;
+  const auto tell = [&](const char* what, double size, const Vec3& probe, const ForceSample& sample) {
+    if (!wrong.empty()) return;
+    std::ostringstream text;
+    text << what << " by " << size << " at tick " << tally.ticks << ", probe " << probe.transpose() << ", proxy "
+         << sample.proxy.transpose() << ", force " << sample.wrench.force.transpose() << ", converged "
+         << !sample.flags.has(TickFlag::not_converged) << ", proxy outside by" << bodies.clearances(sample.proxy);
+    wrong = text.str();
+  };
+  Vec3 probe = bodies.at_clearance(rng, bodies.junction(), 4e-3, 1e-3);
+  if (bodies.clearance(probe) < 0.5e-3) return {};
+  test::touch(bodies.scene(), state, probe);
+  double judged = 0.0;
+  std::optional<Vec3> held_since;
+  for (int leg = 0; leg < 12; ++leg) {
+    const double speed = std::exp(rng.uniform(std::log(0.01), std::log(5.0)));
+    const Vec3 target = bodies.target(rng, probe);
+    const double length = (target - probe).norm();
+    const int ticks = std::min(200, static_cast<int>(std::ceil(length / (speed * 1e-3))));
+    const Vec3 start = probe;
+    for (int i = 1; i <= ticks; ++i) {
+      const Vec3 next = start + std::min(1.0, i * speed * 1e-3 / length) * (target - start);
+      ProbeSample told = test::probe_at(next);
+      told.twist.linear = (next - probe) / 1e-3;
+      probe = next;
+      const ForceSample sample = step(bodies.scene(), state, cache, told, test::tick);
+      ++tally.ticks;
+      const double force = sample.wrench.force.norm();
+      if (force > 0.0) ++tally.touching;
+      const double inside = -bodies.clearance(sample.proxy);
+      if (inside > tolerance) {
+        ++tally.through;
+        tell("through", inside, probe, sample);
+      }
+      const double depth = -bodies.clearance(probe);
+      if (force < test::stiffness * (depth - tolerance) - 1e-9) {
+        ++tally.lost;
+        tell("lost", depth - force / test::stiffness, probe, sample);
+      }
+      const double most = 1.5 * std::sqrt(1.0 + 1.44 * friction * friction);
+      if (force > test::stiffness * (most * std::max(0.0, depth) + 4.0 * tolerance)) {
+        // What has been judged once is judged again where it changes, and now and then.
+        if (!held_since && std::abs(force - judged) < 0.1 * judged && rng.below(16) != 0) continue;
+        judged = force;
+        ++tally.asked;
+        double left = (bodies.led(sample.proxy, probe) - probe).norm();
+        // Over the brink of a face no step leads nearer at first.
+        constexpr double off_brink = 30e-6;
+        const double held = (sample.proxy - probe).norm();
+        if ((bodies.led(sample.proxy, probe, 0.2e-6, off_brink, 0.05) - probe).norm() > held - off_brink) left = held;
+        if (friction > 0.0 && bodies.may_stick(sample.proxy, probe, 1.2 * friction)) left = held;
+        // A barrier may be passed a little late.
+        constexpr double late = 30e-6;
+        if (force <= test::stiffness * (most * left + 4.0 * tolerance)) {
+          held_since.reset();
+        } else if (!held_since) {
+          held_since = probe;
+        } else if ((probe - *held_since).norm() > late) {
+          ++tally.stuck;
+          tell("stuck", force / test::stiffness - left, probe, sample);
+        }
+      } else {
+        held_since.reset();
+      }
+    }
+    if (!wrong.empty()) break;
+  }
+  return wrong;
+}
+
+/// One of `parts` shares of the ticks.
+void never_through_never_stuck_never_lost(std::uint64_t part, std::uint64_t parts) {
+  const double wanted = number_in("ASPERITY_STROKES", 1e6) / static_cast<double>(parts);
+  const std::uint64_t seed = seed_of_the_day();
+  testing::Test::RecordProperty("seed", std::to_string(seed));
+  Tally tally;
+  int told = 0;
+  std::map<std::string, int> kinds;
+  for (std::uint64_t scene = part; static_cast<double>(tally.ticks) < wanted; scene += parts) {
+    Rng rng(seed * 1000003 + scene);
+    const double radius = rng.uniform(0.0, 1.0) < 0.4 ? 0.0 : rng.uniform(0.2e-3, 3e-3);
+    const double friction = rng.uniform(0.0, 1.0) < 0.6 ? 0.0 : rng.uniform(0.05, 0.6);
+    const Bodies bodies(rng, 1 + (rng.below(8) + 6) / 7 + rng.below(2), radius, friction);
+    for (int i = 0; i < 10; ++i) {
+      const Tally before = tally;
+      const std::string wrong = stroke(rng, bodies, friction, tally);
+      if (wrong.empty()) continue;
+      kinds[wrong.substr(0, wrong.find(' ')) + (radius > 0.0 ? " ball" : " point") +
+            (friction > 0.0 ? " with friction: " : ": ") + bodies.told()] += 1;
+      if (++told <= 20)
+        ADD_FAILURE() << "seed " << seed << ", scene " << scene << " (" << bodies.told() << "radius " << radius
+                      << ", friction " << friction << "), stroke " << i << " from tick " << before.ticks << ": "
+                      << wrong;
+    }
+  }
+  for (const auto& [kind, count] : kinds) std::cout << count << " " << kind << "\n";
+  std::cout << "seed " << seed << ": " << tally.ticks << " ticks, " << tally.touching << " touching, " << tally.through
+            << " through, " << tally.lost << " lost, " << tally.stuck << " stuck, " << tally.asked << " asked\n";
+}
+
+class Strokes : public testing::TestWithParam<std::uint64_t> {};
+
+constexpr std::uint64_t most_parts = 8;
+TEST_P(Strokes, AProxyIsNeverThroughNeverStuckNeverLost) {
+  never_through_never_stuck_never_lost(GetParam(), most_parts);
+}
+INSTANTIATE_TEST_SUITE_P(Parts, Strokes, testing::Range(std::uint64_t{0}, most_parts));
+
+}  // namespace
+
+}  // namespace asperity::strokes
