@@ -22,8 +22,7 @@ Status NamedNumbers::all_taken() const {
   for (const auto& [name, value] : taken_) {
     known.push_back(name);
     list += (list.empty() ? "" : ", ") + name;
-    if (!std::isfinite(value))
-      return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, name, "a finite number (SI)"};
+    if (!std::isfinite(value)) return bad_value(fmt::format("is {}", value), name, "a finite number (SI)");
   }
   for (const auto& [name, value] : given_) {
     if (taken_.find(name) != taken_.end()) continue;

@@ -24,7 +24,10 @@ Error Error::at(const std::string& prefix) && {
 }
 
 Error bad_value(std::string what, std::string place, std::string accepted) {
-  return {ErrorCode::bad_value, std::move(what), {}, std::move(place), std::move(accepted)};
+  return refused(ErrorCode::bad_value, std::move(what), std::move(place), std::move(accepted));
+}
+Error refused(ErrorCode code, std::string what, std::string place, std::string accepted) {
+  return {code, std::move(what), {}, std::move(place), std::move(accepted)};
 }
 
 void detail::wrong_side_of_result(const Error* error) noexcept {

@@ -68,6 +68,8 @@ struct Error {
 
 /// The Error of a value that is out of range: "is -1 m", where, and what would be accepted. [any]
 Error bad_value(std::string what, std::string place, std::string accepted);
+/// Any other error that no file is named in. [any]
+Error refused(ErrorCode code, std::string what, std::string place = {}, std::string accepted = {});
 
 namespace detail {
 /// Says on standard error what was asked for in vain, and aborts: `error` is what is there in place of the value,

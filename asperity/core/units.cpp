@@ -64,11 +64,8 @@ std::string accepted_units(Dimension dimension) {
 Result<double> parse_quantity(std::string_view text, Dimension dimension) {
   const std::string_view whole = trimmed(text);
   const auto fail = [&](std::string what) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("\"{}\" {}", whole, what),
-                 {},
-                 {},
-                 "a number, SI or with one of the units " + accepted_units(dimension)};
+    return bad_value(fmt::format("\"{}\" {}", whole, what), "",
+                     "a number, SI or with one of the units " + accepted_units(dimension));
   };
   double value = 0.0;
   const std::string_view digits = !whole.empty() && whole.front() == '+' ? whole.substr(1) : whole;

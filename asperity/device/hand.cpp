@@ -23,7 +23,7 @@ const std::array<HandImpedance, 4>& hand_table() {
 
 Status require_of_hand(bool good, const char* field, double value, const char* accepted) {
   if (good && std::isfinite(value)) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, field, accepted};
+  return bad_value(fmt::format("is {}", value), field, accepted);
 }
 
 }  // namespace
@@ -45,11 +45,8 @@ Result<HandImpedance> find_hand(std::string_view name) {
   const std::vector<std::string> names = hand_preset_names();
   const std::string near = nearest_name(name, names);
   const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return Error{ErrorCode::bad_value,
-               fmt::format("hand \"{}\" is not known{}", name, hint),
-               {},
-               {},
-               fmt::format("{}", fmt::join(names, ", "))};
+  return bad_value(fmt::format("hand \"{}\" is not known{}", name, hint), "",
+                   fmt::format("{}", fmt::join(names, ", ")));
 }
 
 Status validate_hand(const HandImpedance& hand) {

@@ -12,7 +12,7 @@ namespace {
 
 Status require_positive(double value, const char* place, const char* accepted) {
   if (std::isfinite(value) && value > 0.0) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, place, accepted};
+  return bad_value(fmt::format("is {}", value), place, accepted);
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ const std::array<DeviceProfile, profile_count>& profile_table() {
 
 Status require_of_profile(bool good, const char* field, double value, const char* accepted) {
   if (good && std::isfinite(value)) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, field, accepted};
+  return bad_value(fmt::format("is {}", value), field, accepted);
 }
 
 }  // namespace
@@ -105,11 +105,8 @@ Result<DeviceProfile> find_profile(std::string_view name) {
   const std::vector<std::string> names = device_profile_names();
   const std::string near = nearest_name(name, names);
   const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return Error{ErrorCode::bad_value,
-               fmt::format("device \"{}\" is not known{}", name, hint),
-               {},
-               {},
-               fmt::format("{}", fmt::join(names, ", "))};
+  return bad_value(fmt::format("device \"{}\" is not known{}", name, hint), "",
+                   fmt::format("{}", fmt::join(names, ", ")));
 }
 
 Status validate_profile(const DeviceProfile& profile) {

@@ -4,7 +4,7 @@ namespace asperity {
 
 Result<ReplayDevice> ReplayDevice::build(std::vector<ProbeSample> samples) {
   if (samples.empty()) {
-    return Error{ErrorCode::bad_value, "there is no sample to replay", {}, "samples", "one sample or more"};
+    return bad_value("there is no sample to replay", "samples", "one sample or more");
   }
   return ReplayDevice(std::move(samples));
 }

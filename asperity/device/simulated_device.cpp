@@ -18,7 +18,7 @@ constexpr double tremor_high = 12.0;  // Hz
 
 Status require_of_simulation(bool good, double value, const char* place, const char* accepted) {
   if (good && std::isfinite(value)) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, place, accepted};
+  return bad_value(fmt::format("is {}", value), place, accepted);
 }
 
 Vec3 shortened(const Vec3& v, double limit) noexcept {

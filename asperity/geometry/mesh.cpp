@@ -26,11 +26,8 @@ Error bad_mesh(std::string what, std::string place, std::string accepted) {
 
 Status check_source(const MeshSource& source, const MeshBuildSettings& settings) {
   if (!(settings.scale > 0.0) || !std::isfinite(settings.scale)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("the mesh scale is {}", settings.scale),
-                 {},
-                 "scale",
-                 "a finite number above 0 (metres per unit of the file)"};
+    return bad_value(fmt::format("the mesh scale is {}", settings.scale), "scale",
+                     "a finite number above 0 (metres per unit of the file)");
   }
   if (source.triangles.empty()) return bad_mesh("has no triangles", {}, "at least one triangle with area");
   if (source.triangles.size() > most_triangles || source.positions.size() >= no_index) {
@@ -389,11 +386,8 @@ bool TriangleMesh::measure_faces(std::vector<Vec3>& sums) {
 
 Status TriangleMesh::place(std::span<const Vec3> positions) {
   if (positions.size() != positions_.size()) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("has {} positions", positions.size()),
-                 {},
-                 "moved mesh",
-                 fmt::format("{}, one for every vertex of the mesh", positions_.size())};
+    return refused(ErrorCode::mismatch, fmt::format("has {} positions", positions.size()), "moved mesh",
+                   fmt::format("{}, one for every vertex of the mesh", positions_.size()));
   }
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = Vec3::Constant(-infinity);

@@ -300,7 +300,7 @@ Result<Experiment> with_law(const Experiment& experiment, const Law& law) {
     changed.canonical_json = json.dump(2, ' ', false, SceneJson::error_handler_t::replace);
     return changed;
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::bad_value, std::string("cannot be felt by another law: ") + failure.what(), {}, {}, {}};
+    return bad_value(std::string("cannot be felt by another law: ") + failure.what(), "", "");
   }
 }
 

@@ -40,12 +40,9 @@ Result<std::string> builtin_scene_json(std::string_view name) {
     if (edit_distance(names.back(), name) == 0) return std::string(file.text);
   }
   const std::string near = nearest_name(name, names);
-  return Error{ErrorCode::bad_value,
-               fmt::format("\"{}\" is no built-in scene{}", name,
-                           near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-               {},
-               {},
-               fmt::format("{}", fmt::join(names, ", "))};
+  return bad_value(fmt::format("\"{}\" is no built-in scene{}", name,
+                               near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+                   "", fmt::format("{}", fmt::join(names, ", ")));
 }
 
 std::string scene_schema_json() {

@@ -102,7 +102,7 @@ Status only_keys(const Json& object, std::initializer_list<std::string_view> kno
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     std::string accepted;
     for (const std::string_view name : known) accepted += (accepted.empty() ? "" : ", ") + std::string(name);
-    return Error{ErrorCode::bad_key, "is not read", {}, fmt::format("{}.{}", place, key.substr(0, 60)), accepted};
+    return refused(ErrorCode::bad_key, "is not read", fmt::format("{}.{}", place, key.substr(0, 60)), accepted);
   }
   return success();
 }
@@ -268,8 +268,7 @@ class MaterialPlanner {
     ASPERITY_TRY(height.offset, number_at(own, "offset", 0.0, place));
     if (const Json* white = member(own, "white_is")) {
       const std::string text = text_of(white);
-      if (text != "high" && text != "deep")
-        return Error{ErrorCode::bad_value, "is neither", {}, place + ".white_is", "\"high\", \"deep\""};
+      if (text != "high" && text != "deep") return bad_value("is neither", place + ".white_is", "\"high\", \"deep\"");
       height.white_is_deep = text == "deep";
     }
     ASPERITY_TRY(plan.height, texture_info(texture, texture_place));
@@ -309,11 +308,8 @@ class MaterialPlanner {
     const Json* type = member(json, "type");
     entry.type = type == nullptr ? "High_Resolution" : text_of(type);
     if (std::find(std::begin(texture_types), std::end(texture_types), entry.type) == std::end(texture_types)) {
-      return Error{ErrorCode::bad_value,
-                   "is no such type",
-                   {},
-                   place + ".type",
-                   "\"High_Resolution\", \"Low_Resolution\", \"Reference\", \"Other\""};
+      return bad_value("is no such type", place + ".type",
+                       "\"High_Resolution\", \"Low_Resolution\", \"Reference\", \"Other\"");
     }
     entry.extras = member(json, "extras");
     const Json* own = member(entry.extras, "asperity");
@@ -397,7 +393,7 @@ class ImageLoader {
     const Json& json = root_["textures"][static_cast<std::size_t>(index)];
     const Json* source = member(json, "source");
     if (source == nullptr) {
-      return Error{ErrorCode::file_unsupported, "names no PNG or JPEG", {}, place + ".source", "the index of an image"};
+      return refused(ErrorCode::file_unsupported, "names no PNG or JPEG", place + ".source", "the index of an image");
     }
     ASPERITY_TRY(const int image, index_in(*source, count_of(root_, "images"), "images", place + ".source"));
     GltfTexture texture;
@@ -463,11 +459,8 @@ class ImageLoader {
       return error;
     }
     if (image->pixels() > max_pixels - pixels_) {
-      return Error{ErrorCode::too_large,
-                   "brings the images to too many pixels",
-                   {},
-                   place,
-                   fmt::format("at most {} together", max_pixels)};
+      return refused(ErrorCode::too_large, "brings the images to too many pixels", place,
+                     fmt::format("at most {} together", max_pixels));
     }
     pixels_ += image->pixels();
     names_[index] = name.empty() ? place : fmt::format("{} ({})", place, name);
@@ -487,11 +480,8 @@ Result<GltfMaterial> finish(Plan plan, ImageLoader& images, std::vector<std::str
   if (plan.normals) {
     ASPERITY_TRY(material.normals->texture, images.texture(plan.normals->texture));
     if (!material.normals->texture.image->has_colour()) {
-      return Error{ErrorCode::bad_map,
-                   "has no colours, and so no normals",
-                   {},
-                   plan.normals->place,
-                   "an image of red, green and blue"};
+      return refused(ErrorCode::bad_map, "has no colours, and so no normals", plan.normals->place,
+                     "an image of red, green and blue");
     }
   }
   if (plan.height) {
@@ -576,11 +566,8 @@ Result<std::vector<std::uint32_t>> source_of_faces(const MeshSource& source, con
     };
     while (at < source.triangles.size() && !is_same(at)) ++at;
     if (at >= source.triangles.size()) {
-      return Error{ErrorCode::mismatch,
-                   fmt::format("face {} of the mesh is no triangle of the source", face),
-                   {},
-                   {},
-                   "the source that the mesh was built from"};
+      return refused(ErrorCode::mismatch, fmt::format("face {} of the mesh is no triangle of the source", face), {},
+                     "the source that the mesh was built from");
     }
     found.push_back(at);
   }
@@ -604,9 +591,8 @@ std::uint16_t normal_code(double component) {
 Result<Image> normal_image_of(const GltfNormals& normals) {
   const Image& stored = *normals.texture.image;
   if (!stored.has_colour())
-    return Error{ErrorCode::bad_map, "has no colours", {}, normals.texture.source, "an image of red, green and blue"};
-  if (!std::isfinite(normals.scale))
-    return Error{ErrorCode::bad_value, "is not finite", {}, "scale", "a finite number"};
+    return refused(ErrorCode::bad_map, "has no colours", normals.texture.source, "an image of red, green and blue");
+  if (!std::isfinite(normals.scale)) return bad_value("is not finite", "scale", "a finite number");
   if (normals.scale == 1.0) return stored;
   Image scaled = stored;
   scaled.channels = 3;

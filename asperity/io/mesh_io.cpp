@@ -33,7 +33,7 @@ bool has_obj_vertex(std::string_view bytes) {
 
 Result<MeshSource> read_by_format(std::string_view bytes, const std::string& name,
                                   const std::filesystem::path* folder) {
-  if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, accepted_formats};
+  if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, accepted_formats);
   const std::string extension = lower_extension(name);
   if (bytes.starts_with("glTF")) return mesh_readers::read_gltf(bytes, folder);
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || extension == ".ply") {
@@ -44,7 +44,7 @@ Result<MeshSource> read_by_format(std::string_view bytes, const std::string& nam
   if (extension == ".obj") return mesh_readers::read_obj(bytes);
   if (bytes.starts_with("solid")) return mesh_readers::read_stl(bytes);
   if (has_obj_vertex(bytes)) return mesh_readers::read_obj(bytes);
-  return Error{ErrorCode::file_unsupported, "is no mesh format that is read here", {}, {}, accepted_formats};
+  return refused(ErrorCode::file_unsupported, "is no mesh format that is read here", {}, accepted_formats);
 }
 
 Error missing(const std::filesystem::path& path, std::string what) {

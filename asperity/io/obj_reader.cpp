@@ -239,17 +239,14 @@ Result<MeshSource> read_obj(std::string_view bytes) {
   ObjScan scan;
   ASPERITY_CHECK(scan.run(bytes));
   if (scan.expected_triangles == 0) {
-    return Error{ErrorCode::bad_mesh,
-                 fmt::format("has {} vertices and no faces", scan.positions.size()),
-                 {},
-                 {},
-                 "an OBJ file with at least one f line of three corners or more"};
+    return refused(ErrorCode::bad_mesh, fmt::format("has {} vertices and no faces", scan.positions.size()), {},
+                   "an OBJ file with at least one f line of three corners or more");
   }
   tinyobj::ObjReaderConfig config;
   config.vertex_color = false;
   tinyobj::ObjReader reader;
   if (!reader.ParseFromString(scan.clean, {}, config)) {
-    return Error{ErrorCode::file_malformed, "cannot be read as OBJ: " + reader.Error(), {}, {}, "an OBJ file"};
+    return refused(ErrorCode::file_malformed, "cannot be read as OBJ: " + reader.Error(), {}, "an OBJ file");
   }
   MeshSource source;
   source.positions = std::move(scan.positions);
@@ -258,7 +255,7 @@ Result<MeshSource> read_obj(std::string_view bytes) {
     source.notes.push_back(fmt::format("{} faces with fewer than three corners left out", scan.short_faces));
   }
   if (source.triangles.empty()) {
-    return Error{ErrorCode::bad_mesh, "has no face with an area", {}, {}, "at least one face with an area"};
+    return refused(ErrorCode::bad_mesh, "has no face with an area", {}, "at least one face with an area");
   }
   if (source.triangles.size() < scan.expected_triangles) {
     source.notes.push_back(

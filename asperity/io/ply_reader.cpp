@@ -79,7 +79,7 @@ class HeaderReader {
         return error(fmt::format("has the unknown header line '{}'", keyword.substr(0, 40)));
       }
     }
-    return Error{ErrorCode::file_truncated, "ends within its header", {}, cursor_.place(), accepted_header};
+    return refused(ErrorCode::file_truncated, "ends within its header", cursor_.place(), accepted_header);
   }
 
  private:
@@ -171,11 +171,8 @@ class ValueReader {
     if (least > 0 && element.count <= left / least) return success();
     if (element.count == 0) return success();
     if (least == 0) {
-      return Error{ErrorCode::file_malformed,
-                   fmt::format("element {} has no properties", element.name),
-                   {},
-                   {},
-                   accepted_header};
+      return refused(ErrorCode::file_malformed, fmt::format("element {} has no properties", element.name), {},
+                     accepted_header);
     }
     return Error{
         ErrorCode::file_truncated,
@@ -237,12 +234,10 @@ class BodyReader {
     const Element* vertices = find("vertex");
     const Element* faces = find("face");
     if (vertices == nullptr || faces == nullptr || vertices->count == 0 || faces->count == 0) {
-      return Error{ErrorCode::bad_mesh,
-                   fmt::format("has {} vertices and {} faces", vertices == nullptr ? 0 : vertices->count,
-                               faces == nullptr ? 0 : faces->count),
-                   {},
-                   {},
-                   "a PLY file with elements vertex and face (no point cloud, no triangle strips)"};
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("has {} vertices and {} faces", vertices == nullptr ? 0 : vertices->count,
+                                 faces == nullptr ? 0 : faces->count),
+                     {}, "a PLY file with elements vertex and face (no point cloud, no triangle strips)");
     }
     vertex_count_ = vertices->count;
     for (const Element& element : header_.elements) {
@@ -299,7 +294,7 @@ class BodyReader {
         column(element, {"x"}), column(element, {"y"}), column(element, {"z"}),
         column(element, {"s", "u", "texture_u", "texture_s"}), column(element, {"t", "v", "texture_v", "texture_t"})};
     if (std::min({wanted[0], wanted[1], wanted[2]}) < 0) {
-      return Error{ErrorCode::file_malformed, "its vertices have no x, y and z", {}, {}, "vertex properties x, y, z"};
+      return refused(ErrorCode::file_malformed, "its vertices have no x, y and z", {}, "vertex properties x, y, z");
     }
     const bool has_uvs = wanted[3] >= 0 && wanted[4] >= 0;
     std::vector<double> row(element.properties.size());
@@ -313,11 +308,9 @@ class BodyReader {
       source_.positions.emplace_back(value(0), value(1), value(2));
       if (has_uvs) vertex_uvs_.emplace_back(static_cast<float>(value(3)), static_cast<float>(value(4)));
       if (source_.positions.back().allFinite() && (!has_uvs || vertex_uvs_.back().allFinite())) continue;
-      return Error{ErrorCode::bad_mesh,
-                   fmt::format("vertex {} (counted from 0) has a coordinate that is not finite", i),
-                   {},
-                   values_.place(),
-                   "finite coordinates"};
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("vertex {} (counted from 0) has a coordinate that is not finite", i), values_.place(),
+                     "finite coordinates");
     }
     return success();
   }
@@ -330,11 +323,8 @@ class BodyReader {
       }
     }
     if (indices == nullptr || indices->type >= Scalar::float32) {
-      return Error{ErrorCode::file_malformed,
-                   "its faces have no list of vertex indices",
-                   {},
-                   {},
-                   "the face property vertex_indices (or vertex_index), a list of whole numbers"};
+      return refused(ErrorCode::file_malformed, "its faces have no list of vertex indices", {},
+                     "the face property vertex_indices (or vertex_index), a list of whole numbers");
     }
     double ignored = 0.0;
     for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -353,11 +343,8 @@ class BodyReader {
     double corners = 0.0;
     ASPERITY_CHECK(values_.next(*property.count_type, corners));
     if (!(corners >= 0.0 && corners <= static_cast<double>(most_corners))) {
-      return Error{ErrorCode::file_unsupported,
-                   fmt::format("face {} has {} corners", face, corners),
-                   {},
-                   values_.place(),
-                   fmt::format("3 to {} corners a face", most_corners)};
+      return refused(ErrorCode::file_unsupported, fmt::format("face {} has {} corners", face, corners), values_.place(),
+                     fmt::format("3 to {} corners a face", most_corners));
     }
     if (corners < 3.0) ++short_faces_;
     std::array<std::uint32_t, 3> fan{};
@@ -365,11 +352,9 @@ class BodyReader {
       double index = 0.0;
       ASPERITY_CHECK(values_.next(property.type, index));
       if (!(index >= 0.0 && index < static_cast<double>(vertex_count_) && index < 4294967295.0)) {
-        return Error{ErrorCode::bad_mesh,
-                     fmt::format("face {} refers to vertex {} of {}", face, index, vertex_count_),
-                     {},
-                     values_.place(),
-                     fmt::format("vertex indices from 0 to {}", vertex_count_ - 1)};
+        return refused(ErrorCode::bad_mesh,
+                       fmt::format("face {} refers to vertex {} of {}", face, index, vertex_count_), values_.place(),
+                       fmt::format("vertex indices from 0 to {}", vertex_count_ - 1));
       }
       fan[static_cast<std::size_t>(std::min(i, 2))] = static_cast<std::uint32_t>(index);
       if (i < 2) continue;
@@ -381,7 +366,7 @@ class BodyReader {
 
   Result<MeshSource> finish() {
     if (source_.triangles.empty()) {
-      return Error{ErrorCode::bad_mesh, "has no face with three corners or more", {}, {}, "at least one triangle"};
+      return refused(ErrorCode::bad_mesh, "has no face with three corners or more", {}, "at least one triangle");
     }
     if (short_faces_ > 0) {
       source_.notes.push_back(fmt::format("{} faces with fewer than three corners left out", short_faces_));

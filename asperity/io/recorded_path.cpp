@@ -35,11 +35,7 @@ Result<double> unit_scale(std::string_view unit, bool is_time, std::size_t line)
   const Dimension dimension = is_time ? Dimension::time : Dimension::length;
   Result<double> scale = parse_quantity(fmt::format("1 {}", unit), dimension);
   if (scale) return *scale;
-  return Error{ErrorCode::bad_value,
-               fmt::format("unit \"{}\" is not known", unit),
-               {},
-               line_place(line),
-               accepted_units(dimension)};
+  return bad_value(fmt::format("unit \"{}\" is not known", unit), line_place(line), accepted_units(dimension));
 }
 
 Result<Sources> parse_header(std::string_view line, std::size_t number) {
@@ -63,11 +59,8 @@ Result<Sources> parse_header(std::string_view line, std::size_t number) {
   }
   for (std::size_t k = 0; k < wanted.size(); ++k) {
     if (found[k]) continue;
-    return Error{ErrorCode::file_malformed,
-                 fmt::format("header has no column \"{}\"", wanted[k]),
-                 {},
-                 line_place(number),
-                 "columns time, x, y, z, each with an optional unit: time [s],x [mm],y [mm],z [mm]"};
+    return refused(ErrorCode::file_malformed, fmt::format("header has no column \"{}\"", wanted[k]), line_place(number),
+                   "columns time, x, y, z, each with an optional unit: time [s],x [mm],y [mm],z [mm]");
   }
   return sources;
 }
@@ -75,21 +68,15 @@ Result<Sources> parse_header(std::string_view line, std::size_t number) {
 Result<double> parse_cell(const std::vector<std::string_view>& cells, std::size_t k, const Source& source,
                           std::size_t line) {
   if (source.column >= cells.size()) {
-    return Error{ErrorCode::file_malformed,
-                 fmt::format("has {} cells, none for \"{}\"", cells.size(), wanted[k]),
-                 {},
-                 line_place(line),
-                 fmt::format("{} cells or more", source.column + 1)};
+    return refused(ErrorCode::file_malformed, fmt::format("has {} cells, none for \"{}\"", cells.size(), wanted[k]),
+                   line_place(line), fmt::format("{} cells or more", source.column + 1));
   }
   const std::string_view cell = cells[source.column];
   double value = 0.0;
   const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (code != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value * source.to_si)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("\"{}\" in column \"{}\" is not a finite number", cell, wanted[k]),
-                 {},
-                 line_place(line),
-                 "a decimal number"};
+    return bad_value(fmt::format("\"{}\" in column \"{}\" is not a finite number", cell, wanted[k]), line_place(line),
+                     "a decimal number");
   }
   return value * source.to_si;
 }
@@ -139,17 +126,14 @@ Result<std::vector<TimedPoint>> parse_recorded_path(std::string_view text) {
     }
     ASPERITY_TRY(const TimedPoint point, parse_row(line, *sources, number));
     if (!points.empty() && point.time <= points.back().time) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("time {} s is not after {} s", point.time.count(), points.back().time.count()),
-                   {},
-                   line_place(number),
-                   "times that increase"};
+      return bad_value(fmt::format("time {} s is not after {} s", point.time.count(), points.back().time.count()),
+                       line_place(number), "times that increase");
     }
     points.push_back(point);
   }
-  if (!sources) return Error{ErrorCode::file_empty, "has no header line", {}, {}, "a CSV with columns time, x, y, z"};
+  if (!sources) return refused(ErrorCode::file_empty, "has no header line", {}, "a CSV with columns time, x, y, z");
   if (points.size() < 2) {
-    return Error{ErrorCode::file_malformed, fmt::format("has {} rows", points.size()), {}, {}, "two rows or more"};
+    return refused(ErrorCode::file_malformed, fmt::format("has {} rows", points.size()), {}, "two rows or more");
   }
   start_at_zero(points);
   return points;
@@ -165,11 +149,8 @@ Result<std::vector<TimedPoint>> recorded_path_from(const Trace& trace) {
     const TimedPoint point{record.probe.time, record.probe.pose.position};
     const bool later = points.empty() || point.time > points.back().time;
     if (!later || !std::isfinite(point.time.count()) || !point.position.allFinite()) {
-      return Error{ErrorCode::bad_value,
-                   "has no finite position, or a time that does not increase",
-                   {},
-                   fmt::format("tick {}", record.tick),
-                   "finite positions at increasing times"};
+      return bad_value("has no finite position, or a time that does not increase", fmt::format("tick {}", record.tick),
+                       "finite positions at increasing times");
     }
     points.push_back(point);
   }

@@ -114,13 +114,13 @@ Result<Side> side_of(double lower, double upper, double period, double wave, boo
   if (!std::isfinite(wave)) return side;
   const double texels = std::ceil((side.upper - side.lower) * texels_a_wavelength / wave);
   if (!(texels <= most_texels)) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("would make {:.0f} texels of {} along {}", texels,
-                             format_length(wave / texels_a_wavelength), format_length(side.upper - side.lower)),
-                 {},
-                 place,
-                 fmt::format("geometry of at most {} texels a side, {:g} a wavelength; \"as\": \"texture\" needs none",
-                             most_texels, texels_a_wavelength)};
+    return refused(
+        ErrorCode::too_large,
+        fmt::format("would make {:.0f} texels of {} along {}", texels, format_length(wave / texels_a_wavelength),
+                    format_length(side.upper - side.lower)),
+        place,
+        fmt::format("geometry of at most {} texels a side, {:g} a wavelength; \"as\": \"texture\" needs none",
+                    most_texels, texels_a_wavelength));
   }
   side.texels = std::max(fewest_texels, static_cast<int>(texels));
   return side;

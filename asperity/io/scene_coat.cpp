@@ -69,12 +69,10 @@ class CoatReader {
     const double half = 0.5 * mesh_.bounds().diagonal();
     const char* key = reader_.has("height_range") ? "height_range" : (reader_.has("height") ? "height" : "height_map");
     if (highest > half) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest),
-                               format_length(2.0 * half)),
-                   {},
-                   reader_.place_of(key),
-                   fmt::format("heights of at most half the diagonal ({})", format_length(half))};
+      return bad_value(fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest),
+                                   format_length(2.0 * half)),
+                       reader_.place_of(key),
+                       fmt::format("heights of at most half the diagonal ({})", format_length(half)));
     }
     const double range = heights.highest() - heights.lowest();
     if (range > remesh_share * mesh_.mean_edge()) {

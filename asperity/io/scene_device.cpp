@@ -12,7 +12,7 @@ constexpr double full_rate = 1e6;
 Result<std::string> name_of(const SceneJson& json, const std::string& place, const char* accepted) {
   if (json.is_string()) return json.get<std::string>();
   if (json.is_object()) return std::string();
-  return Error{ErrorCode::bad_type, std::string("is ") + json_type(json), {}, place, accepted};
+  return refused(ErrorCode::bad_type, std::string("is ") + json_type(json), place, accepted);
 }
 
 IdealProbeSettings read_ideal(const SceneJson* json, const std::string& place, double stiffness, ObjectReader& parent) {

@@ -23,11 +23,8 @@ Result<TransferFunction> read_transfer(ObjectReader& reader) {
   for (std::size_t i = 0; i < json->size(); ++i) {
     const SceneJson& point = (*json)[i];
     if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
-      return Error{ErrorCode::bad_type,
-                   "is no pair of numbers",
-                   {},
-                   fmt::format("{}[{}]", reader.place_of("transfer"), i),
-                   accepted};
+      return refused(ErrorCode::bad_type, "is no pair of numbers",
+                     fmt::format("{}[{}]", reader.place_of("transfer"), i), accepted);
     }
     points.push_back({point[0].get<double>(), point[1].get<double>()});
   }

@@ -49,11 +49,8 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
   } else if (blend != nullptr && blend->is_array()) {
     for (std::size_t i = 0; i < blend->size(); ++i) {
       if (!(*blend)[i].is_number()) {
-        return Error{ErrorCode::bad_type,
-                     fmt::format("is {}", json_type((*blend)[i])),
-                     {},
-                     fmt::format("{}[{}]", reader.place_of("blend"), i),
-                     "weights from 0 to 1"};
+        return refused(ErrorCode::bad_type, fmt::format("is {}", json_type((*blend)[i])),
+                       fmt::format("{}[{}]", reader.place_of("blend"), i), "weights from 0 to 1");
       }
       weights.push_back((*blend)[i].get<double>());
     }
@@ -175,7 +172,7 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     return ScenePart<Law>{*law, law_json(*law)};
   }
   if (!json.is_object()) {
-    return Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place, "a law's name or an object"};
+    return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, "a law's name or an object");
   }
   if (json.contains("type") && json["type"].is_string()) {
     // Its numbers are its own, and so is what is said of them.

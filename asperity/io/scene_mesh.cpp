@@ -163,11 +163,8 @@ class GeneratorReader {
     const std::string place = reader_.place_of("mesostructure");
     for (const char* key : {"normals", "normal_map", "green", "stitching"}) {
       if (!json.is_object() || !json.contains(key)) continue;
-      return Error{ErrorCode::bad_key,
-                   "is not read by M_G, whose geometry follows the heights",
-                   {},
-                   fmt::format("{}.{}", place, key),
-                   "no such key here"};
+      return refused(ErrorCode::bad_key, "is not read by M_G, whose geometry follows the heights",
+                     fmt::format("{}.{}", place, key), "no such key here");
     }
     ASPERITY_TRY(ScenePart<CoatSource> source, read_coat(json, place, base, context_));
     Result<Coat> coat = Coat::build(base, std::move(source.value.parts), source.value.settings);

@@ -93,11 +93,8 @@ Status close(Instance& instance, const SceneJson& json, const std::string& place
                      : worn.maps().has_normal_map() ? "a normal map"
                                                     : nullptr;
   if (lost != nullptr) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("is baked into the heights alone, and the coat has {}", lost),
-                 {},
-                 place,
-                 "a coat of heights, or no closing"};
+    return refused(ErrorCode::mismatch, fmt::format("is baked into the heights alone, and the coat has {}", lost),
+                   place, "a coat of heights, or no closing");
   }
   Result<ClosedRelief> baked = close_relief(relief, settings, context.progress);
   if (!baked) return std::move(baked).error().at(place);

@@ -180,11 +180,8 @@ Result<ScalarGrid> scalars_of(Samples samples, const VolumeWords& words, const O
   if (auto* grid = std::get_if<ScalarGrid>(&samples)) {
     if (words.derive) return located(derive(*grid, *words.derive, context.progress), "derive");
     if (words.part) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("\"{}\" holds scalars", grid->name()),
-                   {},
-                   reader.place_of("component"),
-                   "no component, or an array of vectors"};
+      return bad_value(fmt::format("\"{}\" holds scalars", grid->name()), reader.place_of("component"),
+                       "no component, or an array of vectors");
     }
     return std::move(*grid);
   }
@@ -195,12 +192,9 @@ Result<ScalarGrid> scalars_of(Samples samples, const VolumeWords& words, const O
     constexpr std::array<VectorPart, 3> parts{VectorPart::x, VectorPart::y, VectorPart::z};
     if (words.component < 3) return part_of(vectors, parts[static_cast<std::size_t>(words.component)]);
   }
-  return Error{ErrorCode::bad_value,
-               fmt::format("\"{}\" holds vectors, and a surface is of one number", vectors.name),
-               {},
-               reader.place(),
-               "\"component\" (magnitude, x, y, z), or \"derive\" (vorticity_magnitude, q_criterion, helicity, "
-               "gradient_magnitude)"};
+  return bad_value(fmt::format("\"{}\" holds vectors, and a surface is of one number", vectors.name), reader.place(),
+                   "\"component\" (magnitude, x, y, z), or \"derive\" (vorticity_magnitude, q_criterion, helicity, "
+                   "gradient_magnitude)");
 }
 
 void scale(Samples& samples, double factor, const Vec3& offset) {

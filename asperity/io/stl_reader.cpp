@@ -16,14 +16,12 @@ Result<MeshSource> read_binary(std::string_view bytes) {
   const std::size_t count = bits_at(bytes, header_size);
   const std::size_t wanted = first_record + count * record_size;
   if (count == 0) {
-    return Error{ErrorCode::bad_mesh, "has no triangles", {}, "byte 80", "an STL file with at least one triangle"};
+    return refused(ErrorCode::bad_mesh, "has no triangles", "byte 80", "an STL file with at least one triangle");
   }
   if (bytes.size() < wanted) {
-    return Error{ErrorCode::file_truncated,
-                 fmt::format("promises {} triangles ({} bytes) and has {} bytes", count, wanted, bytes.size()),
-                 {},
-                 fmt::format("byte {}", bytes.size()),
-                 "a complete STL file"};
+    return refused(ErrorCode::file_truncated,
+                   fmt::format("promises {} triangles ({} bytes) and has {} bytes", count, wanted, bytes.size()),
+                   fmt::format("byte {}", bytes.size()), "a complete STL file");
   }
   MeshSource source;
   source.positions.reserve(3 * count);
@@ -38,11 +36,9 @@ Result<MeshSource> read_binary(std::string_view bytes) {
         position[axis] = static_cast<double>(std::bit_cast<float>(bits));
       }
       if (!position.allFinite()) {
-        return Error{ErrorCode::bad_mesh,
-                     fmt::format("triangle {} (counted from 0) has a coordinate that is not finite", i),
-                     {},
-                     fmt::format("byte {}", at),
-                     "finite coordinates"};
+        return refused(ErrorCode::bad_mesh,
+                       fmt::format("triangle {} (counted from 0) has a coordinate that is not finite", i),
+                       fmt::format("byte {}", at), "finite coordinates");
       }
       source.positions.push_back(position);
     }
@@ -74,7 +70,7 @@ class AsciiReader {
       }
     }
     if (!source_.triangles.empty()) return std::move(source_);
-    return Error{ErrorCode::bad_mesh, "has no facets", {}, {}, "an STL file with at least one facet"};
+    return refused(ErrorCode::bad_mesh, "has no facets", {}, "an STL file with at least one facet");
   }
 
  private:
@@ -150,11 +146,8 @@ Result<MeshSource> read_stl(std::string_view bytes) {
   const bool text = bytes.starts_with("solid") && bytes.find('\0') == std::string_view::npos;
   if (text && !is_exact_binary_stl(bytes)) return AsciiReader(bytes).run();
   if (bytes.size() < first_record) {
-    return Error{ErrorCode::file_truncated,
-                 fmt::format("has {} bytes", bytes.size()),
-                 {},
-                 {},
-                 "an STL file: 'solid ...', or 84 bytes and 50 a triangle"};
+    return refused(ErrorCode::file_truncated, fmt::format("has {} bytes", bytes.size()), {},
+                   "an STL file: 'solid ...', or 84 bytes and 50 a triangle");
   }
   return read_binary(bytes);
 }

@@ -208,7 +208,7 @@ void remove_regular_file(const std::string& path) {
 Result<TraceMetadata> parse_metadata(std::string_view text) {
   const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
   if (!json.is_object()) {
-    return Error{ErrorCode::file_malformed, "metadata is no JSON object", {}, fmt::format("byte {}", header_fixed), {}};
+    return refused(ErrorCode::file_malformed, "metadata is no JSON object", fmt::format("byte {}", header_fixed));
   }
   const auto string_at = [&](const char* key) {
     const auto it = json.find(key);
@@ -343,11 +343,8 @@ TraceWriter::~TraceWriter() {
 Result<TraceWriter> TraceWriter::open(const std::string& path, const TraceMetadata& metadata,
                                       const TraceWriterSettings& settings) {
   if (settings.records_per_frame < 1 || settings.records_per_frame > max_records_per_frame) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {}", settings.records_per_frame),
-                 {},
-                 "records_per_frame",
-                 fmt::format("1 to {}", max_records_per_frame)};
+    return bad_value(fmt::format("is {}", settings.records_per_frame), "records_per_frame",
+                     fmt::format("1 to {}", max_records_per_frame));
   }
   const std::string text = to_json(metadata);
   if (text.size() > max_metadata) {
@@ -458,11 +455,8 @@ bool begins_like_a_trace(std::span<const std::byte> bytes) {
 }
 
 Error truncated_header(std::size_t size, std::size_t needed) {
-  return Error{ErrorCode::file_truncated,
-               fmt::format("ends inside its header, after {} of {} bytes", size, needed),
-               {},
-               fmt::format("byte {}", size),
-               {}};
+  return refused(ErrorCode::file_truncated, fmt::format("ends inside its header, after {} of {} bytes", size, needed),
+                 fmt::format("byte {}", size));
 }
 
 std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
@@ -482,7 +476,7 @@ Result<std::size_t> check_header(std::span<const std::byte> bytes) {
   const auto refuse = [](ErrorCode code, std::string what, std::size_t at, std::string accepted) {
     return Error{code, std::move(what), {}, fmt::format("byte {}", at), std::move(accepted)};
   };
-  if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, "a trace file"};
+  if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, "a trace file");
   if (!begins_like_a_trace(bytes)) {
     return refuse(ErrorCode::file_malformed, "is no trace", 0,
                   "a file written by asperity, which begins with ASPTRACE");

@@ -47,14 +47,11 @@ void read_size(ObjectReader& reader, Sidecar& sidecar) {
     const SceneJson& n = (*size)[a];
     if (!n.is_number()) {
       return reader.fail(
-          Error{ErrorCode::bad_type, fmt::format("is {}", json_type(n)), {}, place, "a whole number of samples"});
+          refused(ErrorCode::bad_type, fmt::format("is {}", json_type(n)), place, "a whole number of samples"));
     }
     if (!n.is_number_unsigned() || n.get<std::uint64_t>() == 0 || n.get<std::uint64_t>() > most_nodes) {
-      return reader.fail(Error{ErrorCode::bad_value,
-                               fmt::format("is {}", n.dump()),
-                               {},
-                               place,
-                               fmt::format("a whole number, 1 to {}", most_nodes)});
+      return reader.fail(
+          bad_value(fmt::format("is {}", n.dump()), place, fmt::format("a whole number, 1 to {}", most_nodes)));
     }
     sidecar.size[a] = n.get<std::uint64_t>();
   }
@@ -78,7 +75,7 @@ Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, 
     const SceneJson& number = (*value)[a];
     const std::string place = fmt::format("{}[{}]", reader.place_of(key), a);
     if (!number.is_number()) {
-      reader.fail(Error{ErrorCode::bad_type, fmt::format("is {}", json_type(number)), {}, place, accepted});
+      reader.fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(number)), place, accepted));
       return fallback;
     }
     const auto read = number.get<double>();

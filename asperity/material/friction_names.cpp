@@ -93,30 +93,21 @@ Status validate(const FrictionLaw& law) {
     const double value = law.*parameter.member;
     const bool reads = std::find(read.begin(), read.end(), parameter.name) != read.end();
     if (!reads && value != plain.*parameter.member) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("is not read by the friction law {}", friction_name(law.kind)),
-                   {},
-                   parameter.name,
-                   listed(read)};
+      return bad_value(fmt::format("is not read by the friction law {}", friction_name(law.kind)), parameter.name,
+                       listed(read));
     }
     const bool low = parameter.above ? !(value > parameter.least) : !(value >= parameter.least);
     if (low || !(value <= parameter.most))
-      return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, parameter.name, parameter.accepted};
+      return bad_value(fmt::format("is {}", value), parameter.name, parameter.accepted);
   }
   if (law.kind == FrictionKind::karnopp && law.formulation == Formulation::literal && law.damping > 0.0) {
-    return Error{ErrorCode::bad_value,
-                 "is the consistent form's: the printed spring has none",
-                 {},
-                 "damping",
-                 "0, or formulation \"consistent\""};
+    return bad_value("is the consistent form's: the printed spring has none", "damping",
+                     "0, or formulation \"consistent\"");
   }
   if (law.kind == FrictionKind::coulomb && law.formulation == Formulation::literal &&
       law.stick_speed != plain.stick_speed) {
-    return Error{ErrorCode::bad_value,
-                 "is the consistent form's: the literal one jumps at rest",
-                 {},
-                 "stick_speed",
-                 "formulation \"consistent\""};
+    return bad_value("is the consistent form's: the literal one jumps at rest", "stick_speed",
+                     "formulation \"consistent\"");
   }
   return success();
 }

@@ -71,7 +71,7 @@ const std::vector<NamedLaw>& named_laws() {
 }
 
 Error option_error(std::string option, double value, std::string accepted) {
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, std::move(option), std::move(accepted)};
+  return bad_value(fmt::format("is {}", value), std::move(option), std::move(accepted));
 }
 
 Status validate_avila(const AvilaLaw& law) {
@@ -90,11 +90,8 @@ Status validate_cross_uncross(const CrossUncrossLaw& law) {
   if (!(law.reach >= 0.0 && std::isfinite(law.reach)))
     return option_error("reach", law.reach, "a length of 0 or more (m, mm)");
   if (law.reach > 0.0 && law.formulation == Formulation::consistent) {
-    return Error{ErrorCode::bad_value,
-                 "is the literal form's: the consistent one looks as far as it has to",
-                 {},
-                 "reach",
-                 "0, or formulation \"literal\""};
+    return bad_value("is the literal form's: the consistent one looks as far as it has to", "reach",
+                     "0, or formulation \"literal\"");
   }
   return success();
 }
@@ -105,11 +102,8 @@ Status validate_virtual_contact_point(const VirtualContactPointLaw& law) {
   if (!(law.offset >= 0.0 && std::isfinite(law.offset)))
     return option_error("offset", law.offset, "a length of 0 or more (m, mm)");
   if (law.magnitude != ContactMagnitude::distance && law.formulation == Formulation::consistent) {
-    return Error{ErrorCode::bad_value,
-                 "is the literal form's: the consistent one is the slope of one energy",
-                 {},
-                 "magnitude",
-                 "\"distance\", or formulation \"literal\""};
+    return bad_value("is the literal form's: the consistent one is the slope of one energy", "magnitude",
+                     "\"distance\", or formulation \"literal\"");
   }
   return success();
 }
@@ -166,16 +160,13 @@ Result<Law> law_by_name(std::string_view name) {
   std::string list;
   for (const std::string& known : all) list += (list.empty() ? "" : ", ") + known;
   const std::string near = nearest_name(name, all);
-  return Error{ErrorCode::bad_value,
-               fmt::format("\"{}\" is no law{}", name, near.empty() ? "" : "; did you mean \"" + near + "\"?"),
-               {},
-               {},
-               list};
+  return bad_value(fmt::format("\"{}\" is no law{}", name, near.empty() ? "" : "; did you mean \"" + near + "\"?"), "",
+                   list);
 }
 
 Status validate(const Law& law) {
   if (std::holds_alternative<std::shared_ptr<const CustomLaw>>(law) && custom_of(law) == nullptr)
-    return Error{ErrorCode::bad_value, "holds no law", {}, {}, "a law made by CustomLaw::build"};
+    return bad_value("holds no law", "", "a law made by CustomLaw::build");
   if (const auto* avila = std::get_if<AvilaLaw>(&law)) return validate_avila(*avila);
   if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) return validate_cross_uncross(*cross);
   if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) return validate_virtual_contact_point(*contact);
@@ -199,11 +190,9 @@ Status validate(const Law& law) {
     const bool given =
         meso->rho != plain.rho || meso->blend != plain.blend || !meso->blend_map.empty() || meso->test_neighbours;
     if (meso->formulation == Formulation::consistent && given) {
-      return Error{ErrorCode::bad_value,
-                   "is the literal form's: the consistent one blends as the coat's stitching says",
-                   {},
-                   meso->test_neighbours ? "test_neighbours" : (meso->rho != plain.rho ? "rho" : "blend"),
-                   "coat.stitching, or formulation \"literal\""};
+      return bad_value("is the literal form's: the consistent one blends as the coat's stitching says",
+                       meso->test_neighbours ? "test_neighbours" : (meso->rho != plain.rho ? "rho" : "blend"),
+                       "coat.stitching, or formulation \"literal\"");
     }
     return validate(Stitching{FoldMode::keep, meso->blend, meso->rho, meso->blend_map});
   }
@@ -213,22 +202,14 @@ Status validate(const Law& law) {
 Status register_custom_law(std::string name, CustomLawFactory factory) {
   Registered& all = registry();
   if (!is_plain_name(name))
-    return Error{ErrorCode::bad_value,
-                 fmt::format("\"{}\" is no name of a law", name),
-                 {},
-                 "name",
-                 "lower-case letters, digits and hyphens"};
+    return bad_value(fmt::format("\"{}\" is no name of a law", name), "name", "lower-case letters, digits and hyphens");
   const auto taken = [&](const std::vector<std::string>& names) {
     return std::find(names.begin(), names.end(), name) != names.end();
   };
   if (taken(all.names) || taken(law_names()))
-    return Error{ErrorCode::bad_value, fmt::format("there is a law \"{}\" already", name), {}, "name", "another name"};
+    return bad_value(fmt::format("there is a law \"{}\" already", name), "name", "another name");
   if (!factory)
-    return Error{ErrorCode::bad_value,
-                 fmt::format("the law \"{}\" has no factory", name),
-                 {},
-                 "factory",
-                 "a function that makes it"};
+    return bad_value(fmt::format("the law \"{}\" has no factory", name), "factory", "a function that makes it");
   all.names.push_back(std::move(name));
   all.factories.push_back(std::move(factory));
   return success();

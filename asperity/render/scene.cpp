@@ -52,29 +52,25 @@ Status check_potential(const Instance& instance, const std::string& place) {
     key = ".band";
   }
   if (reach > surface.reach_outside()) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach),
-                             instance.name, format_length(surface.grid().outside())),
-                 {},
-                 place + ".law" + key,
-                 fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside()))};
+    return bad_value(
+        fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach), instance.name,
+                    format_length(surface.grid().outside())),
+        place + ".law" + key,
+        fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside())));
   }
   if (std::holds_alternative<NormalPerturbationLaw>(instance.law) && surface.offset() > 0.0) {
-    return Error{ErrorCode::unsupported_pair,
-                 fmt::format("the law \"normal-perturbation\" touches the mesh itself, and \"{}\" has an offset of {}",
-                             instance.name, format_length(surface.offset())),
-                 {},
-                 place + ".law",
-                 "another law, or implicit.offset 0"};
+    return refused(
+        ErrorCode::unsupported_pair,
+        fmt::format("the law \"normal-perturbation\" touches the mesh itself, and \"{}\" has an offset of {}",
+                    instance.name, format_length(surface.offset())),
+        place + ".law", "another law, or implicit.offset 0");
   }
   if (std::holds_alternative<NormalPerturbationLaw>(instance.law) &&
       (surface.mesh() == nullptr || !surface.textured())) {
-    return Error{ErrorCode::unsupported_pair,
-                 fmt::format("the law \"normal-perturbation\" needs a mesh with a texture, and \"{}\" has no {}",
-                             instance.name, surface.mesh() == nullptr ? "mesh" : "texture"),
-                 {},
-                 place + ".law",
-                 "another law, or implicit.texture on a mesh"};
+    return refused(ErrorCode::unsupported_pair,
+                   fmt::format("the law \"normal-perturbation\" needs a mesh with a texture, and \"{}\" has no {}",
+                               instance.name, surface.mesh() == nullptr ? "mesh" : "texture"),
+                   place + ".law", "another law, or implicit.texture on a mesh");
   }
   return success();
 }
@@ -87,17 +83,15 @@ Status check_pair(const Instance& instance, const std::string& place) {
   const bool bare = instance.surface.index() == 0;
   const CustomSurface* custom = custom_of(instance.surface);
   const auto refuse = [&](const char* what, const char* accepted) {
-    return Error{ErrorCode::unsupported_pair,
-                 fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
-                             implicit     ? "an implicit surface"
-                             : iso        ? "an isosurface"
-                             : parametric ? "a parametric surface"
-                             : custom     ? "a surface of its own"
-                             : bare       ? "a bare mesh"
-                                          : "a relief"),
-                 {},
-                 place + ".law",
-                 accepted};
+    return refused(ErrorCode::unsupported_pair,
+                   fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
+                               implicit     ? "an implicit surface"
+                               : iso        ? "an isosurface"
+                               : parametric ? "a parametric surface"
+                               : custom     ? "a surface of its own"
+                               : bare       ? "a bare mesh"
+                                            : "a relief"),
+                   place + ".law", accepted);
   };
   if (const CustomLaw* own = custom_of(instance.law)) {
     if (own->fits(instance.surface)) return success();
@@ -126,7 +120,7 @@ Status check_coat(const Instance& instance, const std::string& place, double pro
   const bool by_coat = proxy || std::holds_alternative<HeightFieldLaw>(instance.law) ||
                        std::holds_alternative<MesostructureLaw>(instance.law);
   const auto refuse = [&](std::string what, const char* where, const char* accepted) {
-    return Error{ErrorCode::unsupported_pair, std::move(what), {}, place + where, accepted};
+    return refused(ErrorCode::unsupported_pair, std::move(what), place + where, accepted);
   };
   const MaterialMaps* maps = relief != nullptr ? relief->coat().materials() : nullptr;
   const bool sticky = instance.material.stickiness > 0.0 || (maps != nullptr && maps->has(MaterialChannel::stickiness));
@@ -155,11 +149,8 @@ Status check_coat(const Instance& instance, const std::string& place, double pro
 Status check(const Instance& instance, std::size_t index, double probe_radius) {
   const std::string place = fmt::format("surfaces[{}]", index);
   if (std::visit([](const auto& surface) { return surface == nullptr; }, instance.surface)) {
-    return Error{ErrorCode::bad_value,
-                 "holds no surface",
-                 {},
-                 place + ".surface",
-                 "a mesh, relief, isosurface, implicit, parametric or custom surface"};
+    return bad_value("holds no surface", place + ".surface",
+                     "a mesh, relief, isosurface, implicit, parametric or custom surface");
   }
   ASPERITY_CHECK(check_pair(instance, place));
   ASPERITY_CHECK(check_fine(instance, place));
@@ -167,14 +158,13 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
   if (probe_radius > 0.0 && !constrains(instance.law)) {
-    return Error{ErrorCode::unsupported_pair,
-                 fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
-                             law_name(instance.law), format_length(probe_radius)),
-                 {},
-                 place + ".law",
-                 base_of(instance.surface) != nullptr && iso_of(instance.surface) == nullptr
-                     ? "proxy, god-object or force-shading, or probe.radius 0"
-                     : "proxy, or probe.radius 0"};
+    return refused(ErrorCode::unsupported_pair,
+                   fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
+                               law_name(instance.law), format_length(probe_radius)),
+                   place + ".law",
+                   base_of(instance.surface) != nullptr && iso_of(instance.surface) == nullptr
+                       ? "proxy, god-object or force-shading, or probe.radius 0"
+                       : "proxy, or probe.radius 0");
   }
   const Pose& pose = instance.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
@@ -244,7 +234,7 @@ void magnify(Instance& instance, double zoom) {
 
 Status check(const SceneSettings& settings) {
   const auto bad = [](const char* place, double value, const char* accepted) {
-    return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, place, accepted};
+    return bad_value(fmt::format("is {}", value), place, accepted);
   };
   const auto length = [](double value) { return std::isfinite(value) && value >= 0.0; };
   if (!length(settings.probe_radius))
@@ -321,8 +311,7 @@ Status check_motion(const Instance& instance, std::size_t index) {
                       std::isfinite(motion.since.count()) && motion.horizon.count() >= 0.0;
   const bool volume = iso_of(instance.surface) != nullptr;
   const std::string place = fmt::format("surfaces[{}].motion", index);
-  if (!finite)
-    return Error{ErrorCode::bad_value, "is not finite", {}, place, "finite velocities, a horizon of 0 s or more"};
+  if (!finite) return bad_value("is not finite", place, "finite velocities, a horizon of 0 s or more");
   if (volume && motion.moves())
     return Error{
         ErrorCode::unsupported_pair, "moves a volume", {}, place, "motion of meshes, reliefs and parametric surfaces"};
@@ -341,7 +330,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
                            std::vector<FieldEffect> effects) {
   ASPERITY_CHECK(check(settings));
   if (instances.empty() && effects.empty()) {
-    return Error{ErrorCode::bad_value, "holds nothing to touch", {}, "surfaces", "at least one surface or effect"};
+    return bad_value("holds nothing to touch", "surfaces", "at least one surface or effect");
   }
   for (std::size_t i = 0; i < effects.size(); ++i) {
     if (auto valid = validate(effects[i]); !valid) return std::move(valid).error().at(fmt::format("effects[{}]", i));
@@ -352,11 +341,9 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
     ASPERITY_CHECK(check(instances[i], i, settings.probe_radius));
     ASPERITY_CHECK(check_motion(instances[i], i));
     if (settings.view.zoom != 1.0 && relief_of(instances[i]) == nullptr && has_local_material(instances[i])) {
-      return Error{ErrorCode::unsupported_pair,
-                   fmt::format("zooms, and the material of \"{}\" is stored in its volume", instances[i].name),
-                   {},
-                   "view.zoom",
-                   "1, or an implicit surface of one material"};
+      return refused(ErrorCode::unsupported_pair,
+                     fmt::format("zooms, and the material of \"{}\" is stored in its volume", instances[i].name),
+                     "view.zoom", "1, or an implicit surface of one material");
     }
     ASPERITY_CHECK(make_dense(instances[i], i));
     // Room for the probe and for the skin that it rests on, and for what draws it.

@@ -17,7 +17,7 @@ double View::pixel_at(const Vec3& p) const noexcept {
 
 Status validate(const View& view) {
   const auto bad = [](const char* place, const std::string& what, const char* accepted) {
-    return Error{ErrorCode::bad_value, what, {}, place, accepted};
+    return bad_value(what, place, accepted);
   };
   if (!(view.zoom >= 1e-3 && view.zoom <= 1e6)) return bad("zoom", fmt::format("is {:g}", view.zoom), "0.001 to 1e6");
   if (!view.focus.allFinite() || !view.home.allFinite()) return bad("focus", "is not finite", "finite places");

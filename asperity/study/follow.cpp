@@ -16,7 +16,7 @@ namespace {
 constexpr double no_reading = std::numeric_limits<double>::quiet_NaN();
 
 Error bad(double value, std::string place, const char* accepted) {
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, std::move(place), accepted};
+  return bad_value(fmt::format("is {}", value), std::move(place), accepted);
 }
 
 Status check(const DetectionSettings& settings) {

@@ -273,13 +273,12 @@ class LawFitter {
 };
 
 Status check(std::span<const FitTrace> traces, const FitSettings& settings) {
-  if (traces.empty()) return Error{ErrorCode::bad_value, "there are no traces to fit", {}, "traces", "one or more"};
+  if (traces.empty()) return bad_value("there are no traces to fit", "traces", "one or more");
   if (std::none_of(traces.begin(), traces.end(), [](const FitTrace& t) { return t.fitted; }))
-    return Error{ErrorCode::bad_value, "no trace is to be fitted", {}, "traces", "one or more to fit on"};
-  if (settings.laws.empty()) return Error{ErrorCode::bad_value, "there are no laws", {}, "laws", "one or more"};
+    return bad_value("no trace is to be fitted", "traces", "one or more to fit on");
+  if (settings.laws.empty()) return bad_value("there are no laws", "laws", "one or more");
   for (const auto& [name, value] : {std::pair("mass", settings.mass), std::pair("load", settings.load)}) {
-    if (value && !(std::isfinite(*value) && *value > 0.0))
-      return Error{ErrorCode::bad_value, "is not above 0", {}, name, "a number above 0"};
+    if (value && !(std::isfinite(*value) && *value > 0.0)) return bad_value("is not above 0", name, "a number above 0");
   }
   return success();
 }

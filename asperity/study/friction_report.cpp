@@ -195,11 +195,8 @@ std::string verdict(const LawFit& fit, const std::vector<FitTrace>& traces) {
 Result<std::string> friction_report_html(const FrictionReport& report) {
   for (const LawFit& fit : report.laws) {
     if (fit.traces.size() != report.traces.size()) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("has {} comparisons", fit.traces.size()),
-                   {},
-                   "laws",
-                   fmt::format("{}, one for each trace", report.traces.size())};
+      return bad_value(fmt::format("has {} comparisons", fit.traces.size()), "laws",
+                       fmt::format("{}, one for each trace", report.traces.size()));
     }
   }
   return page_html(report.origin.title + " - Asperity", page_data_of(report), friction_script, "");

@@ -19,17 +19,14 @@ Status check(const RigSettings& s) {
                                                      {"dt", s.dt.count()}};
   for (const auto& [name, value] : positive) {
     if (!(std::isfinite(value) && value > 0.0))
-      return Error{ErrorCode::bad_value, fmt::format("is {:g}", value), {}, name, "a number above 0"};
+      return bad_value(fmt::format("is {:g}", value), name, "a number above 0");
   }
   if (!(s.warm_up.count() >= 0.0) || !std::isfinite(s.start) || !std::isfinite(s.start_speed))
     return Error{
         ErrorCode::bad_value, "is not finite, or negative", {}, "warm_up, start, start_speed", "finite numbers"};
   if (!(s.spacing >= s.dt) || !((s.warm_up + s.duration) / s.dt <= most_steps)) {
-    return Error{ErrorCode::bad_value,
-                 "does not fit the spacing, or is too short for the duration",
-                 {},
-                 "dt",
-                 "a step of at most the spacing, and no more than 1e8 of them"};
+    return bad_value("does not fit the spacing, or is too short for the duration", "dt",
+                     "a step of at most the spacing, and no more than 1e8 of them");
   }
   return success();
 }

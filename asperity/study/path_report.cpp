@@ -121,13 +121,10 @@ Result<std::string> path_report_html(const PathReport& report) {
   for (const PathScore& score : report.scores) {
     if (score.rendered.size() == report.path.samples.size() && score.force.error.size() == score.rendered.size())
       continue;
-    return Error{ErrorCode::bad_value,
-                 fmt::format("{} has {} samples", score.law, score.rendered.size()),
-                 {},
-                 "scores",
-                 fmt::format("{}, those of the path", report.path.samples.size())};
+    return bad_value(fmt::format("{} has {} samples", score.law, score.rendered.size()), "scores",
+                     fmt::format("{}, those of the path", report.path.samples.size()));
   }
-  if (report.path.samples.empty()) return Error{ErrorCode::bad_value, "has no samples", {}, "path", "two or more"};
+  if (report.path.samples.empty()) return bad_value("has no samples", "path", "two or more");
   return page_html(report.origin.title + " - Asperity", page_data_of(report), path_script, "");
 }
 

@@ -153,11 +153,8 @@ void start_at_zero(std::vector<MeasuredSample>& samples) {
 }
 
 Error too_many() {
-  return Error{ErrorCode::too_large,
-               fmt::format("has more than {} samples", most_measured_samples),
-               {},
-               {},
-               fmt::format("{} samples or fewer", most_measured_samples)};
+  return refused(ErrorCode::too_large, fmt::format("has more than {} samples", most_measured_samples), {},
+                 fmt::format("{} samples or fewer", most_measured_samples));
 }
 
 Result<std::string> read_text(const fs::path& file) {
@@ -221,20 +218,17 @@ Status check(const MeasuredPath& path, const ScoreSettings& settings) {
         ErrorCode::bad_value, fmt::format("has {} samples", path.samples.size()), {}, "samples", "two or more"};
   if (path.samples.size() > most_measured_samples) return too_many();
   if (!(settings.rate > 0.0) || !std::isfinite(settings.rate))
-    return Error{ErrorCode::bad_value, fmt::format("is {}", settings.rate), {}, "rate", "a rate above 0 (Hz)"};
+    return bad_value(fmt::format("is {}", settings.rate), "rate", "a rate above 0 (Hz)");
   if (!(settings.stiffness >= 0.0) || !std::isfinite(settings.stiffness)) {
     return Error{
         ErrorCode::bad_value, fmt::format("is {}", settings.stiffness), {}, "stiffness", "a stiffness above 0 (N/m)"};
   }
   if (!(settings.lead_in >= 0.0) || !std::isfinite(settings.lead_in))
-    return Error{ErrorCode::bad_value, fmt::format("is {}", settings.lead_in), {}, "lead_in", "a length of 0 or more"};
+    return bad_value(fmt::format("is {}", settings.lead_in), "lead_in", "a length of 0 or more");
   const double steps = path.samples.back().time.count() * settings.rate + static_cast<double>(path.samples.size());
   if (steps > most_resampled) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("takes {:.0f} ticks at {:g} Hz", steps, settings.rate),
-                 {},
-                 "rate",
-                 fmt::format("{:.0f} ticks at most: a lower rate or a shorter path", most_resampled)};
+    return refused(ErrorCode::too_large, fmt::format("takes {:.0f} ticks at {:g} Hz", steps, settings.rate), "rate",
+                   fmt::format("{:.0f} ticks at most: a lower rate or a shorter path", most_resampled));
   }
   return success();
 }
@@ -299,7 +293,7 @@ Result<MeasuredPath> parse_measured_path(std::string_view text) {
     if (path.samples.size() == most_measured_samples) return too_many();
     path.samples.push_back(sample);
   }
-  if (!sources) return Error{ErrorCode::file_empty, "has no header line", {}, {}, columns_accepted};
+  if (!sources) return refused(ErrorCode::file_empty, "has no header line", {}, columns_accepted);
   if (path.samples.size() < 2) {
     return Error{
         ErrorCode::file_malformed, fmt::format("has {} rows", path.samples.size()), {}, {}, "two rows or more"};
@@ -310,7 +304,7 @@ Result<MeasuredPath> parse_measured_path(std::string_view text) {
 
 Result<MeasuredPath> measured_path_from(std::span<const TraceRecord> records, PathPlace place, double stiffness) {
   if (records.size() < 2)
-    return Error{ErrorCode::mismatch, fmt::format("has {} ticks", records.size()), {}, {}, "two or more"};
+    return refused(ErrorCode::mismatch, fmt::format("has {} ticks", records.size()), {}, "two or more");
   if (records.size() > most_measured_samples) return too_many();
   MeasuredPath path;
   path.place = place;
@@ -320,11 +314,8 @@ Result<MeasuredPath> measured_path_from(std::span<const TraceRecord> records, Pa
     if (place == PathPlace::surface) sample.position += force / stiffness;
     const bool later = path.samples.empty() || sample.time > path.samples.back().time;
     if (!later || !std::isfinite(sample.time.count()) || !sample.position.allFinite() || !sample.force.allFinite()) {
-      return Error{ErrorCode::bad_value,
-                   "has no finite position and force, or a time that does not increase",
-                   {},
-                   fmt::format("tick {}", record.tick),
-                   "finite numbers at increasing times"};
+      return bad_value("has no finite position and force, or a time that does not increase",
+                       fmt::format("tick {}", record.tick), "finite numbers at increasing times");
     }
     path.samples.push_back(sample);
   }
@@ -417,14 +408,12 @@ Result<double> common_stiffness(const Scene& scene) {
   for (const Instance& instance : scene.instances()) {
     if (stiffness == 0.0) stiffness = instance.material.stiffness;
     if (instance.material.stiffness == stiffness) continue;
-    return Error{ErrorCode::mismatch,
-                 fmt::format("surfaces of {:g} and {:g} N/m: the path's correction F / k has no one k", stiffness,
-                             instance.material.stiffness),
-                 {},
-                 "stiffness",
-                 "one stiffness for all surfaces (--stiffness)"};
+    return refused(ErrorCode::mismatch,
+                   fmt::format("surfaces of {:g} and {:g} N/m: the path's correction F / k has no one k", stiffness,
+                               instance.material.stiffness),
+                   "stiffness", "one stiffness for all surfaces (--stiffness)");
   }
-  if (stiffness == 0.0) return Error{ErrorCode::mismatch, "holds no surface", {}, "scene", "a scene with a surface"};
+  if (stiffness == 0.0) return refused(ErrorCode::mismatch, "holds no surface", "scene", "a scene with a surface");
   return stiffness;
 }
 

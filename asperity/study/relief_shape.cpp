@@ -403,7 +403,7 @@ ReliefShape measure_shape(const TriangleMesh& mesh, const Coat& coat) {
 }
 
 Result<ReliefShape> measure_shape(const std::vector<SurfaceFeature>& features) {
-  if (features.empty()) return Error{ErrorCode::bad_value, "holds no feature", {}, "features", "one feature or more"};
+  if (features.empty()) return bad_value("holds no feature", "features", "one feature or more");
   const FeatureSpec& only = features.front().spec();
   const bool round = only.kind == FeatureKind::grating || only.kind == FeatureKind::circular_grating;
   if (features.size() == 1 && round) return cosine_shape(only.wavelength.x(), only.amplitude);

@@ -81,15 +81,11 @@ BarycentricFrame barycentric_frame(const Vec3& a, const Vec3& b, const Vec3& c) 
 namespace {
 
 Error bad_repeat(const Vec2& repeat) {
-  return Error{ErrorCode::bad_value,
-               fmt::format("is {} x {}", repeat.x(), repeat.y()),
-               {},
-               "repeat",
-               "numbers above 0, at most 1e9"};
+  return bad_value(fmt::format("is {} x {}", repeat.x(), repeat.y()), "repeat", "numbers above 0, at most 1e9");
 }
 
 Error bad_mapping(std::string what) {
-  return Error{ErrorCode::mismatch, std::move(what), {}, "mapping", "\"triplanar\" or \"per_face\""};
+  return refused(ErrorCode::mismatch, std::move(what), "mapping", "\"triplanar\" or \"per_face\"");
 }
 
 /// Size of a texel on the surface (m): the median over a sample of the faces; 0 when no face spans any.
@@ -218,28 +214,23 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSe
 Status Coat::check_fits(const TriangleMesh& mesh) const {
   if (mesh.fingerprint() == mesh_) return success();
   const std::size_t triangles = mesh.triangles().size();
-  return Error{ErrorCode::mismatch,
-               triangles == mesh_triangles_
-                   ? fmt::format("was laid on another mesh of {} triangles than this one", triangles)
-                   : fmt::format("was laid on a mesh of {} triangles, this one has {}", mesh_triangles_, triangles),
-               {},
-               "coat",
-               "a coat that Coat::build has laid on the base's own mesh"};
+  return refused(ErrorCode::mismatch,
+                 triangles == mesh_triangles_
+                     ? fmt::format("was laid on another mesh of {} triangles than this one", triangles)
+                     : fmt::format("was laid on a mesh of {} triangles, this one has {}", mesh_triangles_, triangles),
+                 "coat", "a coat that Coat::build has laid on the base's own mesh");
 }
 
 Status Coat::take_layers(std::vector<CoatLayer> layers) {
   if (layers.size() > most_layers) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("are {}", layers.size()),
-                 {},
-                 "layers",
-                 fmt::format("at most {}", most_layers)};
+    return refused(ErrorCode::too_large, fmt::format("are {}", layers.size()), "layers",
+                   fmt::format("at most {}", most_layers));
   }
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const CoatLayer& layer = layers[i];
     const std::string place = fmt::format("layers[{}]", i);
     if ((layer.maps == nullptr) == (layer.solid == nullptr))
-      return Error{ErrorCode::mismatch, "names neither or both of a map and a solid", {}, place, "one of them"};
+      return refused(ErrorCode::mismatch, "names neither or both of a map and a solid", place, "one of them");
     if (!layer.repeat.allFinite() || layer.repeat.minCoeff() <= 0.0 || layer.repeat.maxCoeff() > most_repeats)
       return bad_repeat(layer.repeat).at(place);
     if (layer.solid != nullptr) {

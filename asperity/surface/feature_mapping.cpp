@@ -60,11 +60,9 @@ std::string fitting(double around, double wanted) {
 }
 
 Error no_fit(double turns, const char* of_what, std::string place, std::string accepted) {
-  return Error{ErrorCode::mismatch,
-               fmt::format("{:.6g} {} go once around: the pattern would not close", turns, of_what),
-               {},
-               std::move(place),
-               std::move(accepted)};
+  return refused(ErrorCode::mismatch,
+                 fmt::format("{:.6g} {} go once around: the pattern would not close", turns, of_what), std::move(place),
+                 std::move(accepted));
 }
 
 }  // namespace
@@ -231,11 +229,8 @@ Status FeatureMapping::check(const SurfaceFeature& feature) const {
     }
     case FeatureKind::circular_grating: break;
   }
-  return Error{ErrorCode::mismatch,
-               "circles do not close around a cylinder or a sphere",
-               {},
-               "kind",
-               "another kind of feature, or a plane, a box or texture coordinates to map it by"};
+  return refused(ErrorCode::mismatch, "circles do not close around a cylinder or a sphere", "kind",
+                 "another kind of feature, or a plane, a box or texture coordinates to map it by");
 }
 
 }  // namespace asperity

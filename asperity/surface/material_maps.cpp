@@ -15,22 +15,16 @@ Result<MaterialMaps> MaterialMaps::build(Parts parts) {
     // Stored as floats relative to their middle, zero may come out a rounding below it; readers cut it off.
     const double rounding = 1e-6 * (map->highest() - map->lowest());
     if (map->lowest() >= (stiffness ? std::numeric_limits<double>::min() : -rounding)) continue;
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is as low as {:g} somewhere", map->lowest()),
-                 {},
-                 to_string(static_cast<MaterialChannel>(c)),
-                 stiffness ? "values above 0" : "values of 0 or more"};
+    return bad_value(fmt::format("is as low as {:g} somewhere", map->lowest()),
+                     to_string(static_cast<MaterialChannel>(c)), stiffness ? "values above 0" : "values of 0 or more");
   }
   if ((parts.lay_s == nullptr) != (parts.lay_t == nullptr))
-    return Error{ErrorCode::mismatch, "has one component alone", {}, "lay", "one along s and one along t, or none"};
+    return refused(ErrorCode::mismatch, "has one component alone", "lay", "one along s and one along t, or none");
   for (const auto& component : {parts.lay_s, parts.lay_t}) {
     if (component == nullptr || std::max(std::abs(component->lowest()), std::abs(component->highest())) <= 1.0 + 1e-6)
       continue;
-    return Error{ErrorCode::bad_value,
-                 fmt::format("lies between {:g} and {:g}", component->lowest(), component->highest()),
-                 {},
-                 "lay",
-                 "components between -1 and 1"};
+    return bad_value(fmt::format("lies between {:g} and {:g}", component->lowest(), component->highest()), "lay",
+                     "components between -1 and 1");
   }
   MaterialMaps maps;
   maps.parts_ = std::move(parts);

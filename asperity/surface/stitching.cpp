@@ -75,34 +75,20 @@ double mirror_ratio(const TriangleMesh& mesh, const Shell& shell, std::uint32_t 
 
 Status validate(const Stitching& stitching) {
   if (!(stitching.rho > 0.0 && stitching.rho <= 1.0 / 3.0)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {:g}", stitching.rho),
-                 {},
-                 "rho",
-                 "a width above 0, at most 1/3 of a triangle's height"};
+    return bad_value(fmt::format("is {:g}", stitching.rho), "rho",
+                     "a width above 0, at most 1/3 of a triangle's height");
   }
   if (stitching.folds == FoldMode::fillet &&
       !(stitching.fillet_radius > 0.0 && std::isfinite(stitching.fillet_radius))) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {:g} m", stitching.fillet_radius),
-                 {},
-                 "fillet_radius",
-                 "a radius above 0 m"};
+    return bad_value(fmt::format("is {:g} m", stitching.fillet_radius), "fillet_radius", "a radius above 0 m");
   }
   if (!(stitching.most_rounding >= 0.0)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {:g} m", stitching.most_rounding),
-                 {},
-                 "most_rounding",
-                 "a length of 0 m or more"};
+    return bad_value(fmt::format("is {:g} m", stitching.most_rounding), "most_rounding", "a length of 0 m or more");
   }
   if (stitching.blend != Blend::image) return success();
   if (stitching.blend_map.size() < 2) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("has {} weights", stitching.blend_map.size()),
-                 {},
-                 "blend_map",
-                 "at least two weights, from outside to inside"};
+    return bad_value(fmt::format("has {} weights", stitching.blend_map.size()), "blend_map",
+                     "at least two weights, from outside to inside");
   }
   for (const double weight : stitching.blend_map) {
     if (!(weight >= 0.0 && weight <= 1.0)) {
@@ -111,7 +97,7 @@ Status validate(const Stitching& stitching) {
     }
   }
   if (stitching.blend_map.back() <= 0.0) {
-    return Error{ErrorCode::bad_value, "ends in 0", {}, "blend_map", "a last weight (inside the face) above 0"};
+    return bad_value("ends in 0", "blend_map", "a last weight (inside the face) above 0");
   }
   return success();
 }

@@ -175,11 +175,8 @@ class Converter {
   }
 
   [[nodiscard]] Error too_large(double bytes, double most) const {
-    return Error{ErrorCode::too_large,
-                 fmt::format("would take {:.0f} MiB", bytes / 1048576.0),
-                 {},
-                 "voxel",
-                 fmt::format("at most {:.0f} MiB: a larger voxel or narrower bands", most / 1048576.0)};
+    return refused(ErrorCode::too_large, fmt::format("would take {:.0f} MiB", bytes / 1048576.0), "voxel",
+                   fmt::format("at most {:.0f} MiB: a larger voxel or narrower bands", most / 1048576.0));
   }
 
   /// What the voxeliser makes of the mesh, blocks without a point within the band left out.
@@ -204,7 +201,7 @@ class Converter {
     ASPERITY_TRY(attempt.blocks, voxelizer_(request, progress_));
     if (const double bytes = bytes_of(attempt); bytes > most) return too_large(bytes, most);
     if (attempt.blocks.empty())
-      return Error{ErrorCode::bad_mesh, "gave no stored point", {}, {}, "a mesh with triangles at this voxel"};
+      return refused(ErrorCode::bad_mesh, "gave no stored point", {}, "a mesh with triangles at this voxel");
     return attempt;
   }
 
@@ -297,12 +294,10 @@ class Converter {
       }
     }
     if (!(deepest_stored < 0.0)) {
-      return Error{ErrorCode::bad_mesh,
-                   fmt::format("encloses no stored point by rule {} at a voxel of {} m", to_string(judgement_.rule),
-                               attempt.voxel),
-                   {},
-                   {},
-                   "a closed mesh thicker than the voxel, or rule shell"};
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("encloses no stored point by rule {} at a voxel of {} m", to_string(judgement_.rule),
+                                 attempt.voxel),
+                     {}, "a closed mesh thicker than the voxel, or rule shell");
     }
     SparseSource source;
     source.voxel = attempt.voxel;
@@ -378,11 +373,9 @@ Result<ConvertedMesh> convert_mesh(const TriangleIndex& mesh, const ConversionSe
   ASPERITY_CHECK(check_settings(mesh.mesh(), settings));
   const MeshVoxelizer voxelizer = registered();
   if (voxelizer == nullptr) {
-    return Error{ErrorCode::file_unsupported,
-                 "meshes are made potentials with OpenVDB, which this program was built without",
-                 {},
-                 {},
-                 "OpenVDB 10 (Debian: scripts/install-packages implicit) and a new build"};
+    return refused(ErrorCode::file_unsupported,
+                   "meshes are made potentials with OpenVDB, which this program was built without", {},
+                   "OpenVDB 10 (Debian: scripts/install-packages implicit) and a new build");
   }
   ASPERITY_TRY(Judgement judgement, judge(mesh.mesh(), settings.rule));
   return Converter(mesh, settings, std::move(judgement), voxelizer, progress).run();

@@ -415,11 +415,8 @@ Result<HeightMap> bake(const std::vector<SurfaceFeature>& features, const Vec2& 
   if (columns < 1 || rows < 1)
     return bad_value(fmt::format("is {} x {}", columns, rows), "texels", "1 or more along each axis");
   if (columns > most_side || rows > most_side || std::int64_t{columns} * rows > most_feature_texels) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("is {} x {}", columns, rows),
-                 {},
-                 "texels",
-                 fmt::format("at most {} along each axis and {} in all", most_side, most_feature_texels)};
+    return refused(ErrorCode::too_large, fmt::format("is {} x {}", columns, rows), "texels",
+                   fmt::format("at most {} along each axis and {} in all", most_side, most_feature_texels));
   }
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));

@@ -41,18 +41,15 @@ GridAxis::GridAxis(std::vector<double> nodes) : nodes_(std::move(nodes)) {
 
 Result<GridAxis> GridAxis::build(std::vector<double> nodes) {
   if (nodes.size() < 2 || nodes.size() > (std::size_t{1} << 30)) {
-    return Error{ErrorCode::bad_value, fmt::format("has {} nodes", nodes.size()), {}, {}, "two nodes or more"};
+    return bad_value(fmt::format("has {} nodes", nodes.size()), "", "two nodes or more");
   }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!std::isfinite(nodes[i])) {
-      return Error{ErrorCode::bad_value, "is not finite", {}, fmt::format("node {}", i), "a finite position"};
+      return bad_value("is not finite", fmt::format("node {}", i), "a finite position");
     }
     if (i > 0 && !(nodes[i] > nodes[i - 1])) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("is {:g} after {:g}", nodes[i], nodes[i - 1]),
-                   {},
-                   fmt::format("node {}", i),
-                   "positions that increase"};
+      return bad_value(fmt::format("is {:g} after {:g}", nodes[i], nodes[i - 1]), fmt::format("node {}", i),
+                       "positions that increase");
     }
   }
   return GridAxis(std::move(nodes));
@@ -60,14 +57,11 @@ Result<GridAxis> GridAxis::build(std::vector<double> nodes) {
 
 Result<GridAxis> GridAxis::uniform(double origin, double spacing, std::uint32_t count) {
   if (!std::isfinite(origin) || !std::isfinite(spacing) || !(spacing > 0.0)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("starts at {:g} with a spacing of {:g}", origin, spacing),
-                 {},
-                 {},
-                 "a finite origin and a spacing above 0"};
+    return bad_value(fmt::format("starts at {:g} with a spacing of {:g}", origin, spacing), "",
+                     "a finite origin and a spacing above 0");
   }
   if (count > (1U << 30)) {
-    return Error{ErrorCode::bad_value, fmt::format("has {} nodes", count), {}, {}, "fewer nodes"};
+    return bad_value(fmt::format("has {} nodes", count), "", "fewer nodes");
   }
   std::vector<double> nodes(count);
   for (std::uint32_t i = 0; i < count; ++i) nodes[i] = origin + spacing * i;

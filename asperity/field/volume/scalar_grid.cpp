@@ -19,7 +19,7 @@ std::size_t sample_bytes(SampleType type) {
 Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::string name) {
   for (const GridAxis& axis : axes) {
     if (axis.size() < 2) {
-      return Error{ErrorCode::bad_value, "has an axis without cells", {}, name, "two nodes or more along each axis"};
+      return bad_value("has an axis without cells", name, "two nodes or more along each axis");
     }
   }
   const std::size_t expected =
@@ -27,12 +27,10 @@ Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::st
   ScalarGrid grid;
   const auto take = [&](const auto& values) -> Status {
     if (values.size() != expected) {
-      return Error{ErrorCode::mismatch,
-                   fmt::format("has {} samples for {} x {} x {} places", values.size(), axes[0].size(), axes[1].size(),
-                               axes[2].size()),
-                   {},
-                   name,
-                   fmt::format("{} samples", expected)};
+      return refused(ErrorCode::mismatch,
+                     fmt::format("has {} samples for {} x {} x {} places", values.size(), axes[0].size(),
+                                 axes[1].size(), axes[2].size()),
+                     name, fmt::format("{} samples", expected));
     }
     double lowest = infinity;
     double highest = -infinity;
@@ -45,12 +43,10 @@ Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::st
       }
       if (std::isinf(value)) {
         const std::size_t plane = static_cast<std::size_t>(axes[0].size()) * axes[1].size();
-        return Error{ErrorCode::bad_value,
-                     "is infinite",
-                     {},
-                     fmt::format("{}{}sample ({}, {}, {})", name, name.empty() ? "" : ", ", i % axes[0].size(),
-                                 i % plane / axes[0].size(), i / plane),
-                     "finite values, or not-a-number where nothing is known"};
+        return bad_value("is infinite",
+                         fmt::format("{}{}sample ({}, {}, {})", name, name.empty() ? "" : ", ", i % axes[0].size(),
+                                     i % plane / axes[0].size(), i / plane),
+                         "finite values, or not-a-number where nothing is known");
       }
       lowest = std::min(lowest, value);
       highest = std::max(highest, value);
@@ -59,7 +55,7 @@ Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::st
     grid.highest_ = highest;
     grid.unknown_ = unknown;
     if (unknown == values.size()) {
-      return Error{ErrorCode::bad_value, "holds no sample that is a number", {}, name, "samples that are numbers"};
+      return bad_value("holds no sample that is a number", name, "samples that are numbers");
     }
     return success();
   };

@@ -66,11 +66,8 @@ Status check_source(const SparseSource& source) {
     return bad_value(fmt::format("is {}", source.inside), "inside", "a length below 0 (m)");
   if (source.blocks.empty()) return bad_value("holds none", "blocks", "at least one block");
   if (source.blocks.size() > SparseGrid::most_bricks) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("holds {} blocks", source.blocks.size()),
-                 {},
-                 "blocks",
-                 fmt::format("at most {}", SparseGrid::most_bricks)};
+    return refused(ErrorCode::too_large, fmt::format("holds {} blocks", source.blocks.size()), "blocks",
+                   fmt::format("at most {}", SparseGrid::most_bricks));
   }
   for (std::size_t b = 0; b < source.blocks.size(); ++b) ASPERITY_CHECK(check_block(source.blocks[b], b));
   return success();
@@ -260,11 +257,9 @@ Result<SparseGrid> SparseGrid::build(SparseSource source) {
     entries *= grid.counts_[a];
   }
   if (entries > static_cast<double>(most_table)) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("spans {} x {} x {} bricks", grid.counts_[0], grid.counts_[1], grid.counts_[2]),
-                 {},
-                 "blocks",
-                 fmt::format("at most {} in all", most_table)};
+    return refused(ErrorCode::too_large,
+                   fmt::format("spans {} x {} x {} bricks", grid.counts_[0], grid.counts_[1], grid.counts_[2]),
+                   "blocks", fmt::format("at most {} in all", most_table));
   }
   for (std::size_t a = 0; a < 3; ++a)
     grid.lower_[static_cast<int>(a)] =

@@ -161,11 +161,8 @@ class JsonCheck {
     if (!from.is_number_unsigned()) return malformed("is no index", place, "a whole number from 0");
     const auto index = from.get<std::uint64_t>();
     if (index < count) return from;
-    return Error{ErrorCode::bad_mesh,
-                 fmt::format("refers to {}[{}] of {}", section, index, count),
-                 {},
-                 place,
-                 "indices of things that are there"};
+    return refused(ErrorCode::bad_mesh, fmt::format("refers to {}[{}] of {}", section, index, count), place,
+                   "indices of things that are there");
   }
 
   [[nodiscard]] Result<Json> array(const Json& from, const std::string& place, const Key& key) const {
@@ -244,11 +241,10 @@ Status check_version(const Json& root) {
 Status check_extensions(const Json& root) {
   for (const std::string& extension : words(root, "extensionsRequired")) {
     if (leaves_geometry_alone(extension)) continue;
-    return Error{ErrorCode::file_unsupported,
-                 fmt::format("requires the extension {}, which is not read", extension.substr(0, 60)),
-                 {},
-                 "extensionsRequired",
-                 "plain glTF 2.0 geometry: export without compression, quantisation and instancing"};
+    return refused(ErrorCode::file_unsupported,
+                   fmt::format("requires the extension {}, which is not read", extension.substr(0, 60)),
+                   "extensionsRequired",
+                   "plain glTF 2.0 geometry: export without compression, quantisation and instancing");
   }
   return success();
 }
@@ -349,21 +345,15 @@ Status GltfDocument::read_container(std::string_view bytes) {
     return success();
   }
   const auto truncated = [&](std::uint64_t wanted) {
-    return Error{ErrorCode::file_truncated,
-                 fmt::format("promises {} bytes and has {}", wanted, bytes.size()),
-                 {},
-                 fmt::format("byte {}", bytes.size()),
-                 "a complete .glb file"};
+    return refused(ErrorCode::file_truncated, fmt::format("promises {} bytes and has {}", wanted, bytes.size()),
+                   fmt::format("byte {}", bytes.size()), "a complete .glb file");
   };
   constexpr std::size_t header_size = 12;
   constexpr std::size_t chunk_header = 8;
   if (bytes.size() < header_size + chunk_header) return truncated(header_size + chunk_header);
   if (bits_at(bytes, 4) != 2) {
-    return Error{ErrorCode::file_unsupported,
-                 fmt::format("is version {} of binary glTF", bits_at(bytes, 4)),
-                 {},
-                 "byte 4",
-                 accepted_container};
+    return refused(ErrorCode::file_unsupported, fmt::format("is version {} of binary glTF", bits_at(bytes, 4)),
+                   "byte 4", accepted_container);
   }
   const std::size_t length = bits_at(bytes, 8);
   if (length > bytes.size()) return truncated(length);
@@ -410,14 +400,14 @@ Status GltfDocument::read_json(GltfParts parts) {
     root = Json::parse(json_.begin(), json_.end(), keep);
   } catch (const Json::parse_error& failure) {
     if (failure.byte > json_.size()) {
-      return Error{ErrorCode::file_truncated, "ends within its JSON", {}, {}, "a complete glTF file"};
+      return refused(ErrorCode::file_truncated, "ends within its JSON", {}, "a complete glTF file");
     }
     return malformed("is not JSON", fmt::format("byte {} of the JSON", failure.byte), accepted_container);
   } catch (const Json::exception&) {
     return malformed("holds a number that no computer holds", {}, accepted_container);
   }
   if (values > most_values) {
-    return Error{ErrorCode::too_large, "has too many parts", {}, {}, fmt::format("up to {} values", most_values)};
+    return refused(ErrorCode::too_large, "has too many parts", {}, fmt::format("up to {} values", most_values));
   }
   if (!root.is_object()) return malformed("is no JSON object", {}, accepted_container);
   ASPERITY_CHECK(check_version(root));
@@ -483,11 +473,8 @@ Result<std::string> read_start(const std::filesystem::path& path, std::size_t le
   std::ifstream stream(path, std::ios::binary);
   stream.read(bytes.data(), static_cast<std::streamsize>(length));
   if (stream) return bytes;
-  return Error{ErrorCode::file_missing,
-               fmt::format("names \"{}\", which cannot be read", path.filename().string()),
-               {},
-               place,
-               "a file that may be read"};
+  return refused(ErrorCode::file_missing, fmt::format("names \"{}\", which cannot be read", path.filename().string()),
+                 place, "a file that may be read");
 }
 
 Status GltfDocument::read_external(Buffer& buffer, const std::string& place) const {
@@ -517,11 +504,8 @@ Result<std::string> GltfDocument::resource(const std::string& uri, const std::st
   std::error_code problem;
   const std::uintmax_t size = std::filesystem::file_size(path, problem);
   if (problem || size > largest_resource) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("names \"{}\", which has {} bytes", uri.substr(0, 200), size),
-                 {},
-                 place,
-                 "files up to 2 GiB"};
+    return refused(ErrorCode::too_large, fmt::format("names \"{}\", which has {} bytes", uri.substr(0, 200), size),
+                   place, "files up to 2 GiB");
   }
   return read_start(path, static_cast<std::size_t>(size), place);
 }
@@ -550,7 +534,7 @@ Result<std::string_view> GltfDocument::buffer(std::size_t index) {
   if (buffer.bytes) return std::string_view(*buffer.bytes);
   const std::string place = fmt::format("buffers[{}]", index);
   if (buffer.length > largest_buffer) {
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", buffer.length), {}, place, "buffers up to 4 GiB"};
+    return refused(ErrorCode::too_large, fmt::format("has {} bytes", buffer.length), place, "buffers up to 4 GiB");
   }
   if (buffer.uri.empty()) {
     if (index > 0 || !has_binary_) return malformed("names no data", place, "a uri, or the data of a .glb file");

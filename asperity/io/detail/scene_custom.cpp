@@ -15,11 +15,8 @@ Result<double> any_quantity(const std::string& text, const std::string& place) {
   for (const Dimension dimension : dimensions) {
     if (const Result<double> value = parse_quantity(text, dimension)) return *value;
   }
-  return Error{ErrorCode::bad_value,
-               fmt::format("\"{}\" is no number with a unit", text),
-               {},
-               place,
-               "a number (SI), or a text with a unit (\"2 mm\", \"0.5 N/mm\")"};
+  return bad_value(fmt::format("\"{}\" is no number with a unit", text), place,
+                   "a number (SI), or a text with a unit (\"2 mm\", \"0.5 N/mm\")");
 }
 
 }  // namespace
@@ -35,14 +32,10 @@ Result<NamedNumbers> read_named_numbers(const SceneJson& json, const std::string
     } else if (item.value().is_string()) {
       ASPERITY_TRY(value, any_quantity(item.value().get_ref<const std::string&>(), where));
     } else {
-      return Error{ErrorCode::bad_type,
-                   fmt::format("is {}", json_type(item.value())),
-                   {},
-                   where,
-                   "a number (SI), or a text with a unit"};
+      return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(item.value())), where,
+                     "a number (SI), or a text with a unit");
     }
-    if (!std::isfinite(value))
-      return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, where, "a finite number"};
+    if (!std::isfinite(value)) return bad_value(fmt::format("is {}", value), where, "a finite number");
     numbers.emplace(item.key(), value);
   }
   return NamedNumbers(std::move(numbers));
@@ -59,7 +52,7 @@ Status read_custom(ObjectReader& surface, Instance& instance) {
   const std::string place = surface.place_of("custom");
   const SceneJson& json = *surface.raw("custom");
   if (!json.is_object())
-    return Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place, "an object with a \"type\""};
+    return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, "an object with a \"type\"");
   if (!json.contains("type") || !json["type"].is_string()) {
     return Error{json.contains("type") ? ErrorCode::bad_type : ErrorCode::bad_value,
                  json.contains("type") ? fmt::format("is {}", json_type(json["type"])) : std::string("is missing"),

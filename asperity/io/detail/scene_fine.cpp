@@ -401,23 +401,22 @@ class TextureReader {
 
   [[nodiscard]] Status check_geometry(const SurfaceFeature& feature, const std::string& place) const {
     const IntermediateSurface mapping = part_.fine.mapping.settings().surface;
-    const auto refused = [&](std::string why, std::string accepted) {
-      return Error{ErrorCode::unsupported_pair,
-                   fmt::format("{} of {} would be geometry, {}", feature_name(feature.spec().kind),
-                               format_length(feature.wavelength()), why),
-                   {},
-                   place,
-                   fmt::format("\"as\": \"texture\", {}", accepted)};
+    const auto not_geometry = [&](std::string why, std::string accepted) {
+      return refused(ErrorCode::unsupported_pair,
+                     fmt::format("{} of {} would be geometry, {}", feature_name(feature.spec().kind),
+                                 format_length(feature.wavelength()), why),
+                     place, fmt::format("\"as\": \"texture\", {}", accepted));
     };
     if (!host_.rigid.empty())
-      return refused(fmt::format("and this is {}", host_.rigid), "or a mesh without a coat, or a parametric surface");
+      return not_geometry(fmt::format("and this is {}", host_.rigid),
+                          "or a mesh without a coat, or a parametric surface");
     if (host_.parametric != nullptr && mapping != IntermediateSurface::uv)
-      return refused("which lies in the parameters of this surface", "or the mapping \"uv\"");
+      return not_geometry("which lies in the parameters of this surface", "or the mapping \"uv\"");
     if (host_.parametric != nullptr) return success();
     if (mapping == IntermediateSurface::box)
-      return refused("and a box's six planes make no one map", "or another mapping");
+      return not_geometry("and a box's six planes make no one map", "or another mapping");
     if (std::holds_alternative<GodObjectLaw>(law_))
-      return refused(fmt::format("which the law \"{}\" does not feel", law_name(law_)), "or the law \"proxy\"");
+      return not_geometry(fmt::format("which the law \"{}\" does not feel", law_name(law_)), "or the law \"proxy\"");
     return success();
   }
 
@@ -459,21 +458,16 @@ Status attach_fine(const ObjectReader& surface, TexturePart texture, const FineP
   const bool shapes_friction = material.lay_given || material.friction_map.factors != nullptr;
   const bool felt = fine.source == TextureSource::coat || !fine.texture.empty() || !fine.micro.empty();
   if (texture.given && !felt && !shapes_friction && texture.geometry.empty()) {
-    return Error{ErrorCode::bad_value,
-                 "has no features",
-                 {},
-                 surface.place_of("texture.features"),
-                 "a feature or an array of them (without them, a lay or a friction map of the material)"};
+    return bad_value("has no features", surface.place_of("texture.features"),
+                     "a feature or an array of them (without them, a lay or a friction map of the material)");
   }
   if (!felt && !shapes_friction) return success();
   const bool replaced = base_of(instance.surface) != nullptr && !texture.geometry.empty() &&
                         fine.mapping.settings().surface == IntermediateSurface::uv;
   if (replaced) {
-    return Error{ErrorCode::unsupported_pair,
-                 "is \"uv\", and features that become geometry take the mesh's texture coordinates",
-                 {},
-                 surface.place_of("texture.mapping.surface"),
-                 "\"plane\", \"cylinder\" or \"sphere\", or features of one kind"};
+    return refused(
+        ErrorCode::unsupported_pair, "is \"uv\", and features that become geometry take the mesh's texture coordinates",
+        surface.place_of("texture.mapping.surface"), "\"plane\", \"cylinder\" or \"sphere\", or features of one kind");
   }
   fine.lay = material.lay;
   fine.friction_map = material.friction_map;

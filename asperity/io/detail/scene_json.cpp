@@ -121,7 +121,7 @@ ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string
                            const std::vector<std::string>& known)
     : json_(&json), place_(std::move(place)) {
   if (!json.is_object()) {
-    error_ = Error{ErrorCode::bad_type, fmt::format("is {}", json_type(json)), {}, place_, "an object"};
+    error_ = refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place_, "an object");
     return;
   }
   for (const auto& item : json.items()) {
@@ -186,11 +186,11 @@ double ObjectReader::value_of(const SceneJson& value, const std::string& place, 
     }
     number = *parsed;
   } else {
-    fail(Error{ErrorCode::bad_type, fmt::format("is {}", json_type(value)), {}, place, accepted});
+    fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(value)), place, accepted));
     return 0.0;
   }
   if (!std::isfinite(number) || !range.holds(number)) {
-    fail(Error{ErrorCode::bad_value, fmt::format("is {:.6g}", number), {}, place, accepted});
+    fail(bad_value(fmt::format("is {:.6g}", number), place, accepted));
   }
   return number;
 }

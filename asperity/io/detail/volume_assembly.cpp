@@ -98,20 +98,14 @@ std::vector<T> one_component(const std::vector<T>& samples, std::size_t componen
 /// `name` becomes that of the component.
 Status pick_component(RawVolume& raw, const VolumeRequest& request, std::string& name) {
   if (request.component >= raw.components) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("has no component {}", request.component),
-                 {},
-                 fmt::format("array \"{}\"", raw.array),
-                 fmt::format("0 to {}", raw.components - 1)};
+    return bad_value(fmt::format("has no component {}", request.component), fmt::format("array \"{}\"", raw.array),
+                     fmt::format("0 to {}", raw.components - 1));
   }
   if (raw.components == 1) return success();
   if (request.component < 0) {
     if (raw.components == 3) return success();
-    return Error{ErrorCode::bad_value,
-                 fmt::format("has {} components, and none was chosen", raw.components),
-                 {},
-                 fmt::format("array \"{}\"", raw.array),
-                 fmt::format("a component, 0 to {}", raw.components - 1)};
+    return bad_value(fmt::format("has {} components, and none was chosen", raw.components),
+                     fmt::format("array \"{}\"", raw.array), fmt::format("a component, 0 to {}", raw.components - 1));
   }
   raw.samples = std::visit(
       [&](const auto& samples) {
@@ -163,22 +157,16 @@ Error unknown_array(const std::vector<VolumeArray>& arrays, const VolumeRequest&
   std::vector<std::string> names;
   for (const VolumeArray& array : arrays) {
     if (array.name == request.array) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("the array \"{}\" sits on {}, not on {}s", array.name, nodes_or_cells(array),
-                               to_string(request.association)),
-                   {},
-                   {},
-                   fmt::format("association \"{}\"", to_string(array.association))};
+      return bad_value(fmt::format("the array \"{}\" sits on {}, not on {}s", array.name, nodes_or_cells(array),
+                                   to_string(request.association)),
+                       "", fmt::format("association \"{}\"", to_string(array.association)));
     }
     names.push_back(array.name);
   }
   const std::string near = nearest_name(request.array, names);
-  return Error{ErrorCode::bad_value,
-               fmt::format("holds no array \"{}\"{}", request.array,
-                           near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-               {},
-               {},
-               list_of(arrays)};
+  return bad_value(fmt::format("holds no array \"{}\"{}", request.array,
+                               near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
+                   "", list_of(arrays));
 }
 
 }  // namespace
@@ -198,11 +186,9 @@ Result<std::size_t> sample_count(const std::array<std::uint64_t, 3>& size, std::
     if (count == 0) break;
   }
   if (count == 0 || count > most_bytes / bytes_each) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("{} x {} x {} samples of {} bytes", size[0], size[1], size[2], bytes_each),
-                 {},
-                 {},
-                 fmt::format("at least one sample, and at most {} MiB", most_bytes >> 20U)};
+    return refused(ErrorCode::too_large,
+                   fmt::format("{} x {} x {} samples of {} bytes", size[0], size[1], size[2], bytes_each), {},
+                   fmt::format("at least one sample, and at most {} MiB", most_bytes >> 20U));
   }
   return static_cast<std::size_t>(count);
 }
@@ -214,11 +200,8 @@ Result<VolumeSource> assemble(RawVolume raw, const VolumeRequest& request) {
   const std::size_t held = std::visit([](const auto& s) { return s.size(); }, raw.samples);
   const std::size_t needed = counts[0] * counts[1] * counts[2] * static_cast<std::size_t>(raw.components);
   if (held != needed) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("has {} samples, its axes ask for {}", held, needed),
-                 {},
-                 fmt::format("array \"{}\"", raw.array),
-                 "one sample for each node or cell"};
+    return refused(ErrorCode::mismatch, fmt::format("has {} samples, its axes ask for {}", held, needed),
+                   fmt::format("array \"{}\"", raw.array), "one sample for each node or cell");
   }
   std::string name = raw.array;
   ASPERITY_CHECK(pick_component(raw, request, name));
@@ -232,11 +215,8 @@ Result<VolumeSource> assemble(RawVolume raw, const VolumeRequest& request) {
   ASPERITY_TRY(const std::size_t unknown, count_unknown(raw.samples, counts, components));
   const std::size_t all = counts[0] * counts[1] * counts[2];
   if (unknown == all) {
-    return Error{ErrorCode::bad_value,
-                 "holds no sample that is a number",
-                 {},
-                 fmt::format("array \"{}\"", raw.array),
-                 "an array with values"};
+    return bad_value("holds no sample that is a number", fmt::format("array \"{}\"", raw.array),
+                     "an array with values");
   }
   if (unknown > 0) {
     notes.push_back(
@@ -291,13 +271,10 @@ Result<std::size_t> choose_array(const std::vector<VolumeArray>& arrays, const V
   }
   if (chosen == arrays.size()) {
     if (!request.array.empty()) return unknown_array(arrays, request);
-    return Error{ErrorCode::bad_value,
-                 request.association == Association::any
-                     ? std::string("holds no array that can be used")
-                     : fmt::format("holds no array on {}s", to_string(request.association)),
-                 {},
-                 {},
-                 list_of(arrays)};
+    return bad_value(request.association == Association::any
+                         ? std::string("holds no array that can be used")
+                         : fmt::format("holds no array on {}s", to_string(request.association)),
+                     "", list_of(arrays));
   }
   if (request.array.empty() && arrays.size() > 1) {
     notes.push_back(

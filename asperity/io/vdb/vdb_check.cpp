@@ -52,7 +52,7 @@ class Cursor {
     return std::string(from);
   }
   [[nodiscard]] Error malformed(std::string what, std::string accepted) const {
-    return Error{ErrorCode::file_malformed, std::move(what), {}, fmt::format("byte {}", at_), std::move(accepted)};
+    return refused(ErrorCode::file_malformed, std::move(what), fmt::format("byte {}", at_), std::move(accepted));
   }
 
  private:
@@ -181,11 +181,9 @@ Status read_descriptor(Cursor& cursor, GridOutline& grid, std::size_t file_bytes
         "places behind each other");
   }
   if (static_cast<std::uint64_t>(places[2]) > file_bytes) {
-    return Error{ErrorCode::file_truncated,
-                 fmt::format("ends at byte {}, and grid \"{}\" at byte {}", file_bytes, shown(grid.name), places[2]),
-                 {},
-                 fmt::format("byte {}", cursor.at()),
-                 "the whole file, as it was written"};
+    return refused(ErrorCode::file_truncated,
+                   fmt::format("ends at byte {}, and grid \"{}\" at byte {}", file_bytes, shown(grid.name), places[2]),
+                   fmt::format("byte {}", cursor.at()), "the whole file, as it was written");
   }
   grid.at = static_cast<std::size_t>(places[0]);
   grid.buffers_at = static_cast<std::size_t>(places[1]);
@@ -349,20 +347,14 @@ Result<std::size_t> read_header(Cursor& cursor) {
   if (begins != magic) return Cursor({}, 0, 0).malformed("is no OpenVDB file", "a .vdb file");
   ASPERITY_TRY(const auto version, cursor.number<std::uint32_t>());
   if (version < oldest_version || version > newest_version) {
-    return Error{ErrorCode::file_unsupported,
-                 fmt::format("is of format {}", version),
-                 {},
-                 "byte 8",
-                 fmt::format("formats {} to {}: OpenVDB 2 to 12", oldest_version, newest_version)};
+    return refused(ErrorCode::file_unsupported, fmt::format("is of format {}", version), "byte 8",
+                   fmt::format("formats {} to {}: OpenVDB 2 to 12", oldest_version, newest_version));
   }
   ASPERITY_CHECK(cursor.skip(8));  // of the library
   ASPERITY_TRY(const auto places, cursor.number<std::uint8_t>());
   if (places != 1) {
-    return Error{ErrorCode::file_unsupported,
-                 "was written as a stream, without the places of its grids",
-                 {},
-                 "byte 20",
-                 "a .vdb file written by OpenVDB's io::File"};
+    return refused(ErrorCode::file_unsupported, "was written as a stream, without the places of its grids", "byte 20",
+                   "a .vdb file written by OpenVDB's io::File");
   }
   ASPERITY_CHECK(cursor.skip(36));  // its unique tag
   ASPERITY_TRY([[maybe_unused]] const auto metadata, read_metadata(cursor, 0));

@@ -80,14 +80,11 @@ Result<const GridOutline*> chosen(const std::vector<GridOutline>& grids, const S
     }
   }
   if (first == nullptr && !request.grid.empty()) {
-    return Error{ErrorCode::bad_value, fmt::format("holds no grid \"{}\"", request.grid), {}, "grid", listed(grids)};
+    return bad_value(fmt::format("holds no grid \"{}\"", request.grid), "grid", listed(grids));
   }
   if (first == nullptr) {
-    return Error{ErrorCode::file_unsupported,
-                 fmt::format("holds no level set, but {}", listed(grids)),
-                 {},
-                 {},
-                 "a grid of signed distances: class \"level set\", of float or double"};
+    return refused(ErrorCode::file_unsupported, fmt::format("holds no level set, but {}", listed(grids)), {},
+                   "a grid of signed distances: class \"level set\", of float or double");
   }
   if (!is_distance(*first)) {
     const std::string type = value_type(*first);
@@ -173,11 +170,9 @@ class Reader {
     const std::uint64_t needed =
         (size.leaves + size.tiles) * leaf_bytes + size.nodes_5 * 300'000 + size.nodes_4 * 40'000;
     if (needed > request_.most_bytes) {
-      return Error{ErrorCode::too_large,
-                   fmt::format("would take {} MiB", needed >> 20U),
-                   {},
-                   fmt::format("grid \"{}\"", shown(grid.name)),
-                   fmt::format("at most {} MiB", request_.most_bytes >> 20U)};
+      return refused(ErrorCode::too_large, fmt::format("would take {} MiB", needed >> 20U),
+                     fmt::format("grid \"{}\"", shown(grid.name)),
+                     fmt::format("at most {} MiB", request_.most_bytes >> 20U));
     }
     const auto loaded =
         openvdb::gridPtrCast<Grid>(file_.readGrid(openvdb::io::GridDescriptor::nameAsString(grid.unique_name)));
@@ -253,11 +248,9 @@ class Reader {
     // Most files are mostly empty; this one is nothing else.
     const double most = std::min(static_cast<double>(request_.most_bytes), 2147483648.0);
     if (bytes <= most) return success();
-    return Error{ErrorCode::too_large,
-                 fmt::format("spreads its voxels over a box of {:.3g} blocks", bytes / entry_bytes),
-                 {},
-                 fmt::format("grid \"{}\"", shown(outline.name)),
-                 fmt::format("at most {:.3g}", most / entry_bytes)};
+    return refused(ErrorCode::too_large,
+                   fmt::format("spreads its voxels over a box of {:.3g} blocks", bytes / entry_bytes),
+                   fmt::format("grid \"{}\"", shown(outline.name)), fmt::format("at most {:.3g}", most / entry_bytes));
   }
 
   /// Faces and materials that lie on the same points. Answers whether it was one.
@@ -335,14 +328,11 @@ Result<std::string> file_bytes(const fs::path& path, std::size_t most_bytes) {
   std::error_code problem;
   const std::uintmax_t size = fs::is_regular_file(path, problem) ? fs::file_size(path, problem) : 0;
   std::ifstream stream(path, std::ios::binary);
-  if (problem || !stream) return Error{ErrorCode::file_missing, "cannot be read", {}, {}, "a readable .vdb file"};
-  if (size == 0) return Error{ErrorCode::file_empty, "is empty", {}, {}, "a .vdb file"};
+  if (problem || !stream) return refused(ErrorCode::file_missing, "cannot be read", {}, "a readable .vdb file");
+  if (size == 0) return refused(ErrorCode::file_empty, "is empty", {}, "a .vdb file");
   if (size > most_bytes) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("has {} bytes", size),
-                 {},
-                 {},
-                 fmt::format("at most {} MiB", most_bytes >> 20U)};
+    return refused(ErrorCode::too_large, fmt::format("has {} bytes", size), {},
+                   fmt::format("at most {} MiB", most_bytes >> 20U));
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
@@ -488,13 +478,10 @@ Result<SparseFile> read_file(const fs::path& path, const SparseRequest& request,
     ASPERITY_TRY(const std::string bytes, file_bytes(path, request.most_bytes));
     return Reader(path, bytes, request).read(progress);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", {}, {}, "a smaller grid"};
+    return refused(ErrorCode::too_large, "needs more memory than there is", {}, "a smaller grid");
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::file_malformed,
-                 fmt::format("cannot be read ({})", shown(failure.what())),
-                 {},
-                 {},
-                 "a whole .vdb file"};
+    return refused(ErrorCode::file_malformed, fmt::format("cannot be read ({})", shown(failure.what())), {},
+                   "a whole .vdb file");
   }
 }
 
@@ -507,9 +494,9 @@ Status write_file(const fs::path& path, const SparseGrid& grid, std::size_t mesh
     if (progress) progress("writing grid", 1.0);
     return success();
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", {}, {}, "a smaller grid"};
+    return refused(ErrorCode::too_large, "needs more memory than there is", {}, "a smaller grid");
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::file_unwritable, fmt::format("cannot be written ({})", failure.what()), {}, {}, {}};
+    return refused(ErrorCode::file_unwritable, fmt::format("cannot be written ({})", failure.what()));
   }
 }
 

@@ -71,7 +71,7 @@ Result<std::vector<VoxelBlock>> voxelize(const VoxelRequest& request, const Prog
     initialize();
     return converted(request, progress);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "takes more memory than there is", {}, "voxel", "a larger voxel"};
+    return refused(ErrorCode::too_large, "takes more memory than there is", "voxel", "a larger voxel");
   } catch (const std::exception& failure) {
     return Error{
         ErrorCode::bad_mesh, std::string("cannot be converted: ") + failure.what(), {}, {}, "a mesh of triangles"};

@@ -44,7 +44,7 @@ Status check_list(const fs::path& file, std::size_t most_bytes) {
 Result<double> choose_step(vtkOpenFOAMReader& reader, const std::string& wanted) {
   vtkDoubleArray* times = reader.GetTimeValues();
   if (times == nullptr || times->GetNumberOfTuples() == 0)
-    return Error{ErrorCode::file_empty, "holds no time steps", {}, {}, "a case with results"};
+    return refused(ErrorCode::file_empty, "holds no time steps", {}, "a case with results");
   std::vector<double> steps;
   for (vtkIdType i = 0; i < times->GetNumberOfTuples(); ++i) steps.push_back(times->GetValue(i));
   if (wanted.empty()) return steps.back();
@@ -53,11 +53,7 @@ Result<double> choose_step(vtkOpenFOAMReader& reader, const std::string& wanted)
   for (const double step : steps) {
     if (number && std::abs(step - time) <= 1e-9 * std::max(1.0, std::abs(step))) return step;
   }
-  return Error{ErrorCode::bad_value,
-               fmt::format("has no step \"{}\"", wanted),
-               {},
-               "time",
-               fmt::format("{}", fmt::join(steps, ", "))};
+  return bad_value(fmt::format("has no step \"{}\"", wanted), "time", fmt::format("{}", fmt::join(steps, ", ")));
 }
 
 }  // namespace
@@ -69,7 +65,7 @@ Result<VolumeSource> read_foam(const fs::path& path, const VolumeRequest& reques
   for (const char* list : {"points", "faces", "owner", "neighbour"})
     ASPERITY_CHECK(check_list(folder / "constant" / "polyMesh" / list, request.most_bytes));
   if (!fs::exists(folder / "system" / "controlDict", ignored))
-    return Error{ErrorCode::file_missing, "has no system/controlDict", {}, {}, "an OpenFOAM case"};
+    return refused(ErrorCode::file_missing, "has no system/controlDict", {}, "an OpenFOAM case");
 
   const auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
   // The reader takes the folder from the name alone; the file need not be there.
@@ -92,7 +88,7 @@ Result<VolumeSource> read_foam(const fs::path& path, const VolumeRequest& reques
                    ? vtkUnstructuredGrid::SafeDownCast(blocks->GetBlock(0))
                    : nullptr;
   if (mesh == nullptr)
-    return Error{ErrorCode::file_malformed, "its internal mesh cannot be read", {}, {}, "a whole OpenFOAM case"};
+    return refused(ErrorCode::file_malformed, "its internal mesh cannot be read", {}, "a whole OpenFOAM case");
   ASPERITY_TRY(VolumeSource source, resampled(*mesh, request, progress));
   source.notes.insert(source.notes.begin(), fmt::format("step {:g} of the case", step));
   return source;

@@ -33,11 +33,8 @@ class LegacyFile {
       if (same_word(kind, known)) kind_ = known;
     }
     if (kind_.empty()) {
-      return Error{ErrorCode::file_unsupported,
-                   fmt::format("holds a dataset \"{}\"", kind.substr(0, 40)),
-                   {},
-                   place(),
-                   "STRUCTURED_POINTS, RECTILINEAR_GRID or STRUCTURED_GRID; unstructured grids as .vtu"};
+      return refused(ErrorCode::file_unsupported, fmt::format("holds a dataset \"{}\"", kind.substr(0, 40)), place(),
+                     "STRUCTURED_POINTS, RECTILINEAR_GRID or STRUCTURED_GRID; unstructured grids as .vtu");
     }
     for (std::string_view key = word(); !key.empty(); key = word()) ASPERITY_CHECK(section(std::string(key)));
     if (!have_size_) return bad("states no DIMENSIONS", "DIMENSIONS with three numbers of nodes");
@@ -57,11 +54,8 @@ class LegacyFile {
     return Error{code, std::move(what), {}, place(), std::move(accepted)};
   }
   [[nodiscard]] Error ends() const {
-    return Error{ErrorCode::file_truncated,
-                 "ends before what it declares",
-                 {},
-                 fmt::format("byte {}", bytes_.size()),
-                 "a whole file"};
+    return refused(ErrorCode::file_truncated, "ends before what it declares", fmt::format("byte {}", bytes_.size()),
+                   "a whole file");
   }
 
   std::string_view word() {
@@ -363,13 +357,10 @@ std::size_t legacy_type_bytes(std::string_view type) {
 }
 
 Result<std::string> check_legacy(std::string_view bytes, std::size_t most_bytes) {
-  if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, "a legacy VTK file"};
+  if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, "a legacy VTK file");
   if (bytes.size() > most_bytes) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("has {} bytes", bytes.size()),
-                 {},
-                 {},
-                 fmt::format("at most {} MiB; larger volumes as .vti or .vtr", most_bytes >> 20U)};
+    return refused(ErrorCode::too_large, fmt::format("has {} bytes", bytes.size()), {},
+                   fmt::format("at most {} MiB; larger volumes as .vti or .vtr", most_bytes >> 20U));
   }
   return LegacyFile(bytes, most_bytes).check();
 }

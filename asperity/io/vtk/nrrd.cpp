@@ -23,11 +23,8 @@ Status check_detached(const std::filesystem::path& header, const std::string& na
         ErrorCode::file_unsupported, "its samples are in several files", {}, "data file", "one file of samples"};
   }
   if (!std::filesystem::is_regular_file(data, problem)) {
-    return Error{ErrorCode::file_missing,
-                 fmt::format("the file of samples, \"{}\", cannot be read", name),
-                 {},
-                 "data file",
-                 "a readable file beside the header"};
+    return refused(ErrorCode::file_missing, fmt::format("the file of samples, \"{}\", cannot be read", name),
+                   "data file", "a readable file beside the header");
   }
   return success();
 }
@@ -36,11 +33,9 @@ Status check_length(const NrrdHeader& header, std::size_t held) {
   constexpr std::uint64_t most_packed = 1100;  // zlib
   const std::uint64_t can_hold = header.packed ? held * most_packed : held;
   if (header.data_bytes <= can_hold) return success();
-  return Error{ErrorCode::file_truncated,
-               fmt::format("declares {} bytes of samples, {} are there", header.data_bytes, held),
-               {},
-               "samples",
-               "a whole file"};
+  return refused(ErrorCode::file_truncated,
+                 fmt::format("declares {} bytes of samples, {} are there", header.data_bytes, held), "samples",
+                 "a whole file");
 }
 
 /// The samples behind a header of our own, in a file that lives as long as this.
@@ -87,11 +82,8 @@ Result<VolumeSource> read_nrrd(const std::filesystem::path& path, const VolumeRe
   const std::uint64_t count = header.size[0] * header.size[1] * header.size[2];
   const auto components = static_cast<std::uint64_t>(header.components);
   if (samples == nullptr || static_cast<std::uint64_t>(samples->GetNumberOfValues()) != count * components) {
-    return Error{ErrorCode::file_unsupported,
-                 "VTK reads other sizes than its header states",
-                 {},
-                 {},
-                 "three dimensions, or four with the components first"};
+    return refused(ErrorCode::file_unsupported, "VTK reads other sizes than its header states", {},
+                   "three dimensions, or four with the components first");
   }
   // VTK 9.1 takes the first of three axes for components; the order of the samples is the same.
   samples->SetNumberOfComponents(header.components);

@@ -87,7 +87,7 @@ class NrrdFile {
       ASPERITY_CHECK(field(std::string(trimmed(line.substr(0, colon))), trimmed(line.substr(colon + 1))));
     }
     if (!ended && detached_.empty()) {
-      return Error{ErrorCode::file_truncated, "ends within its header", {}, cursor_.place(), "a whole file"};
+      return refused(ErrorCode::file_truncated, "ends within its header", cursor_.place(), "a whole file");
     }
     header_.data_at = std::min(cursor_.offset(), bytes_.size());
     ASPERITY_CHECK(complete());
@@ -291,11 +291,8 @@ class NrrdFile {
     const std::uint64_t declared = count * bytes_each_;
     const std::uint64_t can_hold = packed ? held * 1100 : held;
     if (declared <= can_hold) return success();
-    return Error{ErrorCode::file_truncated,
-                 fmt::format("declares {} bytes of samples, {} are there", declared, held),
-                 {},
-                 fmt::format("byte {}", bytes_.size()),
-                 "a whole file"};
+    return refused(ErrorCode::file_truncated, fmt::format("declares {} bytes of samples, {} are there", declared, held),
+                   fmt::format("byte {}", bytes_.size()), "a whole file");
   }
 
   std::string_view bytes_;
@@ -318,7 +315,7 @@ class NrrdFile {
 }  // namespace
 
 Result<NrrdHeader> check_nrrd(std::string_view bytes, std::size_t most_bytes, std::string& detached) {
-  if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, "a NRRD file"};
+  if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, "a NRRD file");
   return NrrdFile(bytes, most_bytes, detached).check();
 }
 

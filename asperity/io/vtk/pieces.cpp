@@ -37,11 +37,8 @@ Result<Extent> read_extent(std::string_view text, const XmlElement& element, std
   Extent extent{};
   for (std::size_t a = 0; a < 3; ++a) {
     if (read[2 * a] < -most || read[2 * a + 1] > most || read[2 * a + 1] <= read[2 * a]) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("{} of axis {} is {} to {}", key, "xyz"[a], read[2 * a], read[2 * a + 1]),
-                   {},
-                   line_of(text, element.at),
-                   "two whole numbers, the second above the first"};
+      return bad_value(fmt::format("{} of axis {} is {} to {}", key, "xyz"[a], read[2 * a], read[2 * a + 1]),
+                       line_of(text, element.at), "two whole numbers, the second above the first");
     }
     extent[2 * a] = read[2 * a];
     extent[2 * a + 1] = read[2 * a + 1];
@@ -57,11 +54,8 @@ Status read_image_geometry(std::string_view text, const XmlElement& element, Par
   }
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(partition.spacing[a] > 0.0)) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("Spacing of axis {} is {:g}", "xyz"[a], partition.spacing[a]),
-                   {},
-                   line_of(text, element.at),
-                   "a number above 0"};
+      return bad_value(fmt::format("Spacing of axis {} is {:g}", "xyz"[a], partition.spacing[a]),
+                       line_of(text, element.at), "a number above 0");
     }
   }
   return success();
@@ -71,11 +65,8 @@ Result<Partition> read_partition(std::string_view text, bool image) {
   ASPERITY_TRY(const std::vector<XmlElement> elements, scan_xml(text));
   const std::string type = image ? "PImageData" : "PRectilinearGrid";
   if (elements.front().attribute("type") != type) {
-    return Error{ErrorCode::file_unsupported,
-                 fmt::format("type is \"{}\"", elements.front().attribute("type").substr(0, 40)),
-                 {},
-                 "line 1",
-                 type};
+    return refused(ErrorCode::file_unsupported,
+                   fmt::format("type is \"{}\"", elements.front().attribute("type").substr(0, 40)), "line 1", type);
   }
   Partition partition;
   partition.image = image;
@@ -89,16 +80,16 @@ Result<Partition> read_partition(std::string_view text, bool image) {
     if (element.name != "Piece") continue;
     const std::string place = fmt::format("piece {} ({})", partition.pieces.size(), line_of(text, element.at));
     if (!element.has("Source") || element.attribute("Source").empty())
-      return Error{ErrorCode::file_malformed, "names no file", {}, place, "Source=\"FILE\""};
+      return refused(ErrorCode::file_malformed, "names no file", place, "Source=\"FILE\"");
     ASPERITY_TRY(const Extent extent, read_extent(text, element, "Extent"));
     for (std::size_t a = 0; a < 3; ++a) {
       if (!have_whole || extent[2 * a] < partition.whole[2 * a] || extent[2 * a + 1] > partition.whole[2 * a + 1])
-        return Error{ErrorCode::bad_value, "its Extent is not within WholeExtent", {}, place, "a piece of the whole"};
+        return bad_value("its Extent is not within WholeExtent", place, "a piece of the whole");
     }
     partition.pieces.push_back({extent, std::string(element.attribute("Source")), place});
   }
   if (!have_whole || partition.pieces.empty())
-    return Error{ErrorCode::file_malformed, "names no pieces", {}, {}, "one piece or more"};
+    return refused(ErrorCode::file_malformed, "names no pieces", {}, "one piece or more");
   return partition;
 }
 
@@ -111,22 +102,16 @@ Status check_pieces(const Partition& partition, const std::filesystem::path& fol
     const std::filesystem::path file = folder / piece.source;
     const std::uintmax_t size = std::filesystem::file_size(file, problem);
     if (problem || !std::filesystem::is_regular_file(file, problem)) {
-      return Error{ErrorCode::file_missing,
-                   fmt::format("its file \"{}\" is missing", piece.source),
-                   {},
-                   piece.place,
-                   "every piece beside the file that joins them"};
+      return refused(ErrorCode::file_missing, fmt::format("its file \"{}\" is missing", piece.source), piece.place,
+                     "every piece beside the file that joins them");
     }
     held += most_packed * static_cast<double>(size);
   }
   double cells = 1.0;
   for (std::size_t a = 0; a < 3; ++a) cells *= static_cast<double>(partition.whole[2 * a + 1] - partition.whole[2 * a]);
   if (cells <= held) return success();
-  return Error{ErrorCode::too_large,
-               fmt::format("declares {:g} cells, more than its pieces can hold", cells),
-               {},
-               "WholeExtent",
-               "pieces that cover the whole"};
+  return refused(ErrorCode::too_large, fmt::format("declares {:g} cells, more than its pieces can hold", cells),
+                 "WholeExtent", "pieces that cover the whole");
 }
 
 /// The volume being filled.
@@ -162,12 +147,10 @@ class Assembly {
     for (std::size_t a = 0; a < 3; ++a) {
       const auto nodes = static_cast<std::size_t>(piece.extent[2 * a + 1] - piece.extent[2 * a]) + 1;
       if (grid.nodes[a].size() != nodes) {
-        return Error{ErrorCode::mismatch,
-                     fmt::format("\"{}\" has {} nodes along axis {}, its Extent says {}", piece.source,
-                                 grid.nodes[a].size(), "xyz"[a], nodes),
-                     {},
-                     piece.place,
-                     "a piece of that size"};
+        return refused(ErrorCode::mismatch,
+                       fmt::format("\"{}\" has {} nodes along axis {}, its Extent says {}", piece.source,
+                                   grid.nodes[a].size(), "xyz"[a], nodes),
+                       piece.place, "a piece of that size");
       }
       const auto from = static_cast<std::size_t>(piece.extent[2 * a] - partition_.whole[2 * a]);
       if (!partition_.image)
@@ -182,19 +165,13 @@ class Assembly {
     Result<std::size_t> chosen = volume_assembly::choose_array(found.described, wanted, notes);
     if (!chosen) return std::move(chosen).error().at(piece.place);
     if (found.described[*chosen].components != described_.components)
-      return Error{ErrorCode::mismatch,
-                   fmt::format("\"{}\" has other components", piece.source),
-                   {},
-                   piece.place,
-                   "the same arrays in every piece"};
+      return refused(ErrorCode::mismatch, fmt::format("\"{}\" has other components", piece.source), piece.place,
+                     "the same arrays in every piece");
     std::vector<std::string> lost;
     const SampleArray samples = samples_of(*found.arrays[*chosen], lost);
     if (samples.index() != raw_.samples.index())
-      return Error{ErrorCode::mismatch,
-                   fmt::format("\"{}\" has other types", piece.source),
-                   {},
-                   piece.place,
-                   "the same arrays in every piece"};
+      return refused(ErrorCode::mismatch, fmt::format("\"{}\" has other types", piece.source), piece.place,
+                     "the same arrays in every piece");
     for (std::string& note : lost) {
       if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) notes_.push_back(std::move(note));
     }
@@ -205,11 +182,9 @@ class Assembly {
   Result<VolumeSource> finish() {
     const auto left = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), false));
     if (left > 0) {
-      return Error{ErrorCode::file_malformed,
-                   fmt::format("its pieces leave {} of {} samples out", left, covered_.size()),
-                   {},
-                   "WholeExtent",
-                   "pieces that cover the whole"};
+      return refused(ErrorCode::file_malformed,
+                     fmt::format("its pieces leave {} of {} samples out", left, covered_.size()), "WholeExtent",
+                     "pieces that cover the whole");
     }
     described_.values = covered_.size();
     raw_.cell_data = of_cells();

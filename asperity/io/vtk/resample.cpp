@@ -72,16 +72,12 @@ Result<Axes> choose_axes(vtkDataSet& data, const VolumeRequest& request, std::si
     const double length = bounds[2 * a + 1] - bounds[2 * a];
     width[a] /= static_cast<double>(data.GetNumberOfCells());
     if (!std::isfinite(length) || !(length > 0.0) || !(width[a] > 0.0)) {
-      return Error{ErrorCode::bad_value, fmt::format("is flat along axis {}", "xyz"[a]), {}, {}, "cells with volume"};
+      return bad_value(fmt::format("is flat along axis {}", "xyz"[a]), "", "cells with volume");
     }
     const std::uint64_t cells =
         std::clamp<std::uint64_t>(static_cast<std::uint64_t>(std::min(length / width[a] + 0.5, 1e9)), 1, 1U << 20U);
     if (request.resample[a] == 1)
-      return Error{ErrorCode::bad_value,
-                   fmt::format("asks for one node along axis {}", "xyz"[a]),
-                   {},
-                   "resample",
-                   "two nodes or more, or 0"};
+      return bad_value(fmt::format("asks for one node along axis {}", "xyz"[a]), "resample", "two nodes or more, or 0");
     size[a] = request.resample[a] > 0 ? request.resample[a] : cells + 1;
     if (request.resample[a] == 0) {
       axes[a] = rows(data, static_cast<int>(a), width[a], static_cast<std::size_t>(2 * cells + 2));
@@ -229,12 +225,12 @@ void tell(const Axes& axes, std::size_t originals, std::size_t skipped, VolumeSo
 
 Status check_cells(vtkDataSet& data) {
   auto* grid = vtkUnstructuredGrid::SafeDownCast(&data);
-  if (data.GetNumberOfCells() == 0) return Error{ErrorCode::file_empty, "holds no cells", {}, {}, "cells with volume"};
+  if (data.GetNumberOfCells() == 0) return refused(ErrorCode::file_empty, "holds no cells", {}, "cells with volume");
   double p[3];
   for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i) {
     data.GetPoint(i, p);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-      return Error{ErrorCode::bad_value, "is not finite", {}, fmt::format("point {}", i), "finite points"};
+      return bad_value("is not finite", fmt::format("point {}", i), "finite points");
   }
   if (grid == nullptr) return success();
   vtkDataArray* offsets = grid->GetCells()->GetOffsetsArray();
@@ -243,36 +239,27 @@ Status check_cells(vtkDataSet& data) {
   const auto ids = static_cast<double>(connectivity->GetNumberOfTuples());
   if (grid->GetCellTypesArray() == nullptr || grid->GetCellTypesArray()->GetNumberOfTuples() != cells ||
       offsets->GetNumberOfTuples() != cells + 1) {
-    return Error{ErrorCode::file_malformed, "its cells' types and offsets do not fit", {}, {}, "one for each cell"};
+    return refused(ErrorCode::file_malformed, "its cells' types and offsets do not fit", {}, "one for each cell");
   }
   for (vtkIdType i = 0; i < cells; ++i) {
     const int kind = grid->GetCellTypesArray()->GetValue(i);
     const int points = points_of_kind(kind);
     if (points == 0) {
-      return Error{ErrorCode::file_unsupported,
-                   fmt::format("is of VTK's type {}", kind),
-                   {},
-                   fmt::format("cell {}", i),
-                   "tetrahedra, voxels, hexahedra, wedges, pyramids and prisms"};
+      return refused(ErrorCode::file_unsupported, fmt::format("is of VTK's type {}", kind), fmt::format("cell {}", i),
+                     "tetrahedra, voxels, hexahedra, wedges, pyramids and prisms");
     }
     const double from = offsets->GetComponent(i, 0);
     const double to = offsets->GetComponent(i + 1, 0);
     if (!(from >= 0.0 && to <= ids && to - from == points)) {
-      return Error{ErrorCode::file_malformed,
-                   fmt::format("has {} points, its kind has {}", to - from, points),
-                   {},
-                   fmt::format("cell {}", i),
-                   "as many points as its kind has"};
+      return refused(ErrorCode::file_malformed, fmt::format("has {} points, its kind has {}", to - from, points),
+                     fmt::format("cell {}", i), "as many points as its kind has");
     }
   }
   for (vtkIdType i = 0; i < connectivity->GetNumberOfTuples(); ++i) {
     const double id = connectivity->GetComponent(i, 0);
     if (!(id >= 0.0 && id < static_cast<double>(grid->GetNumberOfPoints()))) {
-      return Error{ErrorCode::file_malformed,
-                   fmt::format("names point {}, of {}", id, grid->GetNumberOfPoints()),
-                   {},
-                   fmt::format("corner {}", i),
-                   "points that there are"};
+      return refused(ErrorCode::file_malformed, fmt::format("names point {}, of {}", id, grid->GetNumberOfPoints()),
+                     fmt::format("corner {}", i), "points that there are");
     }
   }
   return success();

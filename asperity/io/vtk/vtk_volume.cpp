@@ -76,11 +76,9 @@ Result<VolumeSource> read_serial(const fs::path& path, const VolumeRequest& requ
   const GridData grid = grid_of(data);
   if (!grid.nodes[0].empty()) return volume_of(grid, request);
   if (asks_for_resampling(request)) return resampled(*data, request, progress);
-  return Error{ErrorCode::file_unsupported,
-               "is a structured grid whose points are not the product of three axes (to a thousandth of a cell)",
-               {},
-               {},
-               "a rectilinear grid, or \"resample\": [nodes along x, y, z] to have it resampled with a stated error"};
+  return refused(ErrorCode::file_unsupported,
+                 "is a structured grid whose points are not the product of three axes (to a thousandth of a cell)", {},
+                 "a rectilinear grid, or \"resample\": [nodes along x, y, z] to have it resampled with a stated error");
 }
 
 Result<VolumeSource> read_any(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
@@ -88,7 +86,7 @@ Result<VolumeSource> read_any(const fs::path& path, const VolumeRequest& request
   const std::string suffix = suffix_of(path);
   const bool folder = fs::is_directory(path, ignored);
   if (!folder && !fs::is_regular_file(path, ignored))
-    return Error{ErrorCode::file_missing, "no such file", {}, {}, "a volume"};
+    return refused(ErrorCode::file_missing, "no such file", {}, "a volume");
   const VtkSession session;
   if (folder || suffix == ".foam") return read_foam(path, request, progress, session);
   if (suffix == ".pvti" || suffix == ".pvtr") return read_pieces(path, request, progress, session);

@@ -390,7 +390,7 @@ std::size_t xml_type_bytes(std::string_view type) {
 }
 
 Status check_xml(std::string_view bytes, std::string_view type, std::size_t most_bytes) {
-  if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", {}, {}, "a VTK XML file"};
+  if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, "a VTK XML file");
   return XmlFile(bytes, type, most_bytes).check();
 }
 

@@ -17,7 +17,7 @@ bool is_space(char c) {
 }
 
 Error malformed(std::string_view text, std::size_t at, std::string what) {
-  return Error{ErrorCode::file_malformed, std::move(what), {}, line_of(text, at), "a VTK XML file"};
+  return refused(ErrorCode::file_malformed, std::move(what), line_of(text, at), "a VTK XML file");
 }
 
 class Scanner {
@@ -35,11 +35,8 @@ class Scanner {
 
  private:
   [[nodiscard]] Error truncated() const {
-    return Error{ErrorCode::file_truncated,
-                 "ends before its last tag is closed",
-                 {},
-                 line_of(text_, text_.size()),
-                 "a whole VTK XML file"};
+    return refused(ErrorCode::file_truncated, "ends before its last tag is closed", line_of(text_, text_.size()),
+                   "a whole VTK XML file");
   }
 
   Status skip_to(std::string_view end) {
@@ -149,13 +146,11 @@ Result<std::vector<T>> parsed(std::string_view text, const XmlElement& element, 
     values.push_back(value);
   }
   if (values.size() != count) {
-    return Error{ErrorCode::file_malformed,
-                 element.has(key)
-                     ? fmt::format("<{}>: {} is \"{}\"", element.name, key, element.attribute(key).substr(0, 80))
-                     : fmt::format("<{}>: {} is missing", element.name, key),
-                 {},
-                 line_of(text, element.at),
-                 fmt::format("{} number{}", count, count == 1 ? "" : "s")};
+    return refused(ErrorCode::file_malformed,
+                   element.has(key)
+                       ? fmt::format("<{}>: {} is \"{}\"", element.name, key, element.attribute(key).substr(0, 80))
+                       : fmt::format("<{}>: {} is missing", element.name, key),
+                   line_of(text, element.at), fmt::format("{} number{}", count, count == 1 ? "" : "s"));
   }
   return values;
 }

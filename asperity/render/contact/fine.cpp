@@ -412,7 +412,7 @@ Status check_fine(const Instance& instance, const std::string& place) {
   if (instance.fine == nullptr) return success();
   const FineSettings& fine = instance.fine->settings();
   const auto refuse = [&](std::string what, std::string accepted) {
-    return Error{ErrorCode::unsupported_pair, std::move(what), {}, place + ".texture", std::move(accepted)};
+    return refused(ErrorCode::unsupported_pair, std::move(what), place + ".texture", std::move(accepted));
   };
   if (fine.source == TextureSource::coat) {
     if (relief_of(instance) == nullptr)

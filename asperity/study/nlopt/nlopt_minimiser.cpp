@@ -31,7 +31,7 @@ double evaluate(unsigned count, const double* at, double* /*gradient*/, void* da
 Status check(const SearchBox& box) {
   const std::size_t count = box.lower.size();
   const auto refused = [](std::string what) {
-    return Error{ErrorCode::bad_value, std::move(what), {}, "search box", "lower <= start <= upper, equally many"};
+    return bad_value(std::move(what), "search box", "lower <= start <= upper, equally many");
   };
   if (count == 0 || box.upper.size() != count || box.start.size() != count)
     return refused("has no dimensions, or sides of different sizes");

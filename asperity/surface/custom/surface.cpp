@@ -156,20 +156,13 @@ Registered& registry() {
 Status register_custom_surface(std::string name, CustomSurfaceFactory factory) {
   Registered& all = registry();
   if (!is_plain_name(name))
-    return Error{ErrorCode::bad_value,
-                 fmt::format("\"{}\" is no name of a surface", name),
-                 {},
-                 "name",
-                 "lower-case letters, digits and hyphens"};
+    return bad_value(fmt::format("\"{}\" is no name of a surface", name), "name",
+                     "lower-case letters, digits and hyphens");
   if (std::find(all.names.begin(), all.names.end(), name) != all.names.end())
     return Error{
         ErrorCode::bad_value, fmt::format("a surface \"{}\" is registered already", name), {}, "name", "another name"};
   if (!factory)
-    return Error{ErrorCode::bad_value,
-                 fmt::format("the surface \"{}\" has no factory", name),
-                 {},
-                 "factory",
-                 "a function that makes it"};
+    return bad_value(fmt::format("the surface \"{}\" has no factory", name), "factory", "a function that makes it");
   all.names.push_back(std::move(name));
   all.factories.push_back(std::move(factory));
   return success();
@@ -182,12 +175,9 @@ Result<CustomSurface> make_custom_surface(std::string_view name, NamedNumbers& n
     std::string list;
     for (const std::string& known : all.names) list += (list.empty() ? "" : ", ") + known;
     const std::string near = nearest_name(name, all.names);
-    return Error{ErrorCode::bad_value,
-                 fmt::format("\"{}\" is no surface that this program knows{}", name,
-                             near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near)),
-                 {},
-                 "type",
-                 list.empty() ? std::string("a program that registers it (docs/methods/custom.md)") : list};
+    return bad_value(fmt::format("\"{}\" is no surface that this program knows{}", name,
+                                 near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near)),
+                     "type", list.empty() ? std::string("a program that registers it (docs/methods/custom.md)") : list);
   }
   ASPERITY_TRY(CustomSurface surface, all.factories[static_cast<std::size_t>(found - all.names.begin())](numbers));
   ASPERITY_CHECK(numbers.all_taken());

@@ -10,7 +10,7 @@ namespace asperity {
 
 Result<ImplicitSurface> ImplicitSurface::build(ImplicitParts parts) {
   const auto bad = [](const char* place, std::string what, std::string accepted) {
-    return Error{ErrorCode::bad_value, std::move(what), {}, place, std::move(accepted)};
+    return bad_value(std::move(what), place, std::move(accepted));
   };
   if (parts.grid == nullptr) return bad("implicit", "holds no potential", "a sparse grid");
   const SparseGrid& grid = *parts.grid;

@@ -219,7 +219,7 @@ Result<AppliedHeights> apply(const SparseSource& before, const PointHeight& heig
       const Vec3 p = 1e3 * node_position(before, before.blocks[b], here.bad);
       const std::string place = fmt::format("texture at ({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z());
       if (!std::isfinite(here.bad_height))
-        return Error{ErrorCode::bad_value, "gives a height that is not a finite number", {}, place, "finite heights"};
+        return bad_value("gives a height that is not a finite number", place, "finite heights");
       return Error{
           ErrorCode::bad_value,
           fmt::format("gives a height of {:.6g} mm", 1e3 * here.bad_height),
@@ -602,7 +602,7 @@ PointHeight coat_height(const Coat& coat, const TriangleMesh& mesh) {
 
 Result<Redistancing> parse_redistancing(std::string_view name) {
   if (const std::optional<Redistancing> mode = value_named<Redistancing>(name)) return *mode;
-  return Error{ErrorCode::bad_value, fmt::format("is \"{}\"", name), {}, {}, name_list<Redistancing>("", " or ")};
+  return bad_value(fmt::format("is \"{}\"", name), "", name_list<Redistancing>("", " or "));
 }
 
 Result<TexturedPotential> textured(const SparseGrid& grid, const PointHeight& height, Redistancing mode,

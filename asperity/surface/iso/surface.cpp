@@ -9,7 +9,7 @@ namespace asperity {
 
 Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, double threshold, Inside inside,
                                      double threshold_speed) {
-  if (field == nullptr) return Error{ErrorCode::bad_value, "holds no field", {}, "volume", "a scalar field"};
+  if (field == nullptr) return bad_value("holds no field", "volume", "a scalar field");
   if (!(threshold > field->lowest() && threshold < field->highest())) {
     return Error{
         ErrorCode::bad_value,
@@ -29,11 +29,8 @@ Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, d
   surface.threshold_speed_ = threshold_speed;
   surface.measure();
   if (surface.surface_bounds_.empty()) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {:g}: nowhere in the volume does the field pass it", threshold),
-                 {},
-                 "threshold",
-                 "a value that the field passes"};
+    return bad_value(fmt::format("is {:g}: nowhere in the volume does the field pass it", threshold), "threshold",
+                     "a value that the field passes");
   }
   return surface;
 }

@@ -91,14 +91,11 @@ bool curvatures(const ParametricJet& jet, const NormalJet& normals, double& leas
 
 Result<ParametricSurface> ParametricSurface::build(const ParametricSettings& settings) {
   if (static_cast<std::size_t>(settings.shape) >= parametric_names().size())
-    return Error{ErrorCode::bad_value, "is no parametric surface", {}, "shape", "one of parametric_names()"};
+    return bad_value("is no parametric surface", "shape", "one of parametric_names()");
   ASPERITY_CHECK(check_shape(settings));
   if (settings.features.size() > most_features) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("holds {}", settings.features.size()),
-                 {},
-                 "features",
-                 fmt::format("at most {} features", most_features)};
+    return refused(ErrorCode::too_large, fmt::format("holds {}", settings.features.size()), "features",
+                   fmt::format("at most {} features", most_features));
   }
   ParametricSurface surface;
   surface.settings_ = settings;
@@ -160,13 +157,12 @@ Status ParametricSurface::measure() {
     for (const double curvature : {least, most}) {
       const double reach = curvature > 0.0 ? -limits_.lowest : limits_.highest;
       if (reach * std::abs(curvature) <= most_of_radius) continue;
-      return Error{ErrorCode::bad_value,
-                   fmt::format("reach {} {} the surface, which bends there with a radius of {}", format_length(reach),
-                               curvature > 0.0 ? "below" : "above", format_length(1.0 / std::abs(curvature))),
-                   {},
-                   "features",
-                   fmt::format("heights of at most {} there, or a larger surface",
-                               format_length(most_of_radius / std::abs(curvature)))};
+      return bad_value(
+          fmt::format("reach {} {} the surface, which bends there with a radius of {}", format_length(reach),
+                      curvature > 0.0 ? "below" : "above", format_length(1.0 / std::abs(curvature))),
+          "features",
+          fmt::format("heights of at most {} there, or a larger surface",
+                      format_length(most_of_radius / std::abs(curvature))));
     }
     // At the poles of a sphere features depend on v alone.
     const double around = settings_.shape == ParametricShape::sphere ? infinity : jet.u.norm() / settings_.tile.x();
@@ -207,12 +203,11 @@ Status ParametricSurface::check_features() const {
       Vec2 end = start;
       end[k] = upper_[k];
       if (!differ(start, end)) continue;
-      return Error{ErrorCode::mismatch,
-                   fmt::format("step where {} comes back to where it started, after {} of the plane of the features",
-                               k == 0 ? "u" : "v", format_length((upper_[k] - lower_[k]) * settings_.tile[k])),
-                   {},
-                   "features",
-                   "wavelengths (noise: periods) that go a whole number of times into that, or another tile"};
+      return refused(ErrorCode::mismatch,
+                     fmt::format("step where {} comes back to where it started, after {} of the plane of the features",
+                                 k == 0 ? "u" : "v", format_length((upper_[k] - lower_[k]) * settings_.tile[k])),
+                     "features",
+                     "wavelengths (noise: periods) that go a whole number of times into that, or another tile");
     }
   }
   if (settings_.shape != ParametricShape::sphere) return success();
@@ -222,11 +217,8 @@ Status ParametricSurface::check_features() const {
       const bool slopes =
           feature_heights(settings_, place).gradient.norm() > 1e-6 * (limits_.slope_u + limits_.slope_v);
       if (!slopes && !differ(Vec2(lower_.x(), v), place)) continue;
-      return Error{ErrorCode::mismatch,
-                   "are not level at the poles of the sphere",
-                   {},
-                   "features",
-                   "features that depend on v alone and have a crest or a valley at v = -90 and 90 degrees"};
+      return refused(ErrorCode::mismatch, "are not level at the poles of the sphere", "features",
+                     "features that depend on v alone and have a crest or a valley at v = -90 and 90 degrees");
     }
   }
   return success();

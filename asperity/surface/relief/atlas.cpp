@@ -71,11 +71,9 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const Texe
   const std::size_t faces = mesh.triangles().size();
   const Layout layout(faces, texels);
   if (static_cast<double>(layout.width()) * layout.height() > static_cast<double>(max_pixels)) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("the atlas would have {} x {} texels", layout.width(), layout.height()),
-                 {},
-                 "texels",
-                 fmt::format("fewer texels an edge: at most {} in all", max_pixels)};
+    return refused(ErrorCode::too_large,
+                   fmt::format("the atlas would have {} x {} texels", layout.width(), layout.height()), "texels",
+                   fmt::format("fewer texels an edge: at most {} in all", max_pixels));
   }
   ReliefAtlas atlas;
   atlas.width = layout.width();

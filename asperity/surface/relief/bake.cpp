@@ -243,22 +243,17 @@ Result<BakedRelief> bake_relief(const TriangleMesh& mesh, const SignedFormula& f
 Result<std::shared_ptr<const ReliefSurface>> wear_baked(const BakedRelief& baked, const ReliefSettings& settings) {
   ASPERITY_TRY(std::shared_ptr<const ReliefSurface> surface, wear_atlas(baked.mesh, baked.atlas, settings));
   if (surface->shell().directions != Shell::build(baked.mesh).directions) {
-    return Error{ErrorCode::bad_mesh,
-                 "making room for the relief turned the directions that it was baked along",
-                 {},
-                 "on_overlap",
-                 "OnOverlap::refuse, a lower relief, or a finer base mesh"};
+    return refused(ErrorCode::bad_mesh, "making room for the relief turned the directions that it was baked along",
+                   "on_overlap", "OnOverlap::refuse, a lower relief, or a finer base mesh");
   }
   return surface;
 }
 
 Result<TriangleMesh> with_atlas_uvs(const TriangleMesh& mesh, const ReliefAtlas& atlas) {
   if (atlas.corner_uvs.size() != mesh.triangles().size()) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("has {} triangles, the mesh {}", atlas.corner_uvs.size(), mesh.triangles().size()),
-                 {},
-                 "atlas",
-                 "the atlas of this very mesh"};
+    return refused(ErrorCode::mismatch,
+                   fmt::format("has {} triangles, the mesh {}", atlas.corner_uvs.size(), mesh.triangles().size()),
+                   "atlas", "the atlas of this very mesh");
   }
   MeshSource source;
   source.positions.assign(mesh.positions().begin(), mesh.positions().end());

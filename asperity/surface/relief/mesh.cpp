@@ -109,17 +109,16 @@ class Tessellation {
 };
 
 Error too_many(std::size_t faces, int subdivisions, int most) {
-  return Error{ErrorCode::too_large,
-               fmt::format("is {}: {} base triangles would become {:.3g}", subdivisions, faces,
-                           static_cast<double>(faces) * subdivisions * subdivisions),
-               {},
-               "subdivisions",
-               most > 0 ? fmt::format("1 to {}, for at most {} triangles", most, most_tessellated_triangles)
-                        : fmt::format("a base of at most {} triangles", most_tessellated_triangles)};
+  return refused(ErrorCode::too_large,
+                 fmt::format("is {}: {} base triangles would become {:.3g}", subdivisions, faces,
+                             static_cast<double>(faces) * subdivisions * subdivisions),
+                 "subdivisions",
+                 most > 0 ? fmt::format("1 to {}, for at most {} triangles", most, most_tessellated_triangles)
+                          : fmt::format("a base of at most {} triangles", most_tessellated_triangles));
 }
 
 Error too_few(int subdivisions) {
-  return Error{ErrorCode::bad_value, fmt::format("is {}", subdivisions), {}, "subdivisions", "1 or more"};
+  return bad_value(fmt::format("is {}", subdivisions), "subdivisions", "1 or more");
 }
 
 /// Most cuts along an edge that keep `faces` faces within a number of triangles.

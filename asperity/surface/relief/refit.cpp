@@ -8,11 +8,8 @@ namespace asperity {
 
 Result<ReliefSurface> ReliefSurface::moved(MeshSurface base) const {
   if (base.index().lineage() != base_.index().lineage()) {
-    return Error{ErrorCode::mismatch,
-                 "is not the base of this relief with its vertices moved",
-                 {},
-                 "base",
-                 "a mesh that DeformableMesh made of the relief's own base"};
+    return refused(ErrorCode::mismatch, "is not the base of this relief with its vertices moved", "base",
+                   "a mesh that DeformableMesh made of the relief's own base");
   }
   ReliefSurface relief(std::move(base), coat_, rest_);
   ASPERITY_CHECK(relief.settle(settings_));

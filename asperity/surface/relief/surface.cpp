@@ -63,7 +63,7 @@ bool hulls_apart(const ShellPrism& one, const std::array<Vec3, 6>& one_hull, con
 }
 
 Error overlap_error(const std::string& what) {
-  return Error{ErrorCode::bad_mesh, what, {}, "coat", "a lower relief, or on_overlap \"cure\""};
+  return refused(ErrorCode::bad_mesh, what, "coat", "a lower relief, or on_overlap \"cure\"");
 }
 
 }  // namespace

@@ -158,7 +158,7 @@ Status check_length(double value, const char* place) {
   constexpr double shortest = 1e-6;
   constexpr double longest = 1e3;
   if (value >= shortest && value <= longest) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {}", value), {}, place, "a length of 1 um to 1 km"};
+  return bad_value(fmt::format("is {}", value), place, "a length of 1 um to 1 km");
 }
 
 }  // namespace
@@ -223,21 +223,15 @@ Status check_shape(const ParametricSettings& s) {
   if (takes("height")) ASPERITY_CHECK(check_length(s.height, "height"));
   if (takes("scale")) ASPERITY_CHECK(check_length(s.scale, "scale"));
   if (takes("tube") && !(s.tube <= 0.95 * s.radius)) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("is {} on a radius of {}", s.tube, s.radius),
-                 {},
-                 "tube",
-                 "at most 0.95 of the radius, so that the torus stays open in the middle"};
+    return bad_value(fmt::format("is {} on a radius of {}", s.tube, s.radius), "tube",
+                     "at most 0.95 of the radius, so that the torus stays open in the middle");
   }
   if (takes("neck") && !(s.neck >= 0.05 && s.neck <= 0.95))
-    return Error{ErrorCode::bad_value, fmt::format("is {}", s.neck), {}, "neck", "0.05 to 0.95 of the widest radius"};
+    return bad_value(fmt::format("is {}", s.neck), "neck", "0.05 to 0.95 of the widest radius");
   for (int k = 0; k < 2; ++k) {
     if (!(s.tile[k] >= 1e-6 && s.tile[k] <= 1e3)) {
-      return Error{ErrorCode::bad_value,
-                   fmt::format("is {}", s.tile[k]),
-                   {},
-                   fmt::format("tile[{}]", k),
-                   "a length of 1 um to 1 km per unit of the parameter"};
+      return bad_value(fmt::format("is {}", s.tile[k]), fmt::format("tile[{}]", k),
+                       "a length of 1 um to 1 km per unit of the parameter");
     }
   }
   return success();
@@ -249,11 +243,7 @@ const char* parametric_name(ParametricShape shape) {
 
 Result<ParametricShape> parametric_by_name(std::string_view name) {
   if (const std::optional<ParametricShape> shape = value_named<ParametricShape>(name)) return *shape;
-  return Error{ErrorCode::bad_value,
-               fmt::format("is \"{}\", which is no parametric surface", name),
-               {},
-               {},
-               name_list<ParametricShape>()};
+  return bad_value(fmt::format("is \"{}\", which is no parametric surface", name), "", name_list<ParametricShape>());
 }
 
 const std::vector<std::string>& parametric_names() {
