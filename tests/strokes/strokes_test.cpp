@@ -290,7 +290,7 @@ void never_through_never_stuck_never_lost(std::uint64_t part, std::uint64_t part
 
 class Strokes : public testing::TestWithParam<std::uint64_t> {};
 
-constexpr std::uint64_t most_parts = 8;
+constexpr std::uint64_t most_parts = 16;
 TEST_P(Strokes, AProxyIsNeverThroughNeverStuckNeverLost) {
   never_through_never_stuck_never_lost(GetParam(), most_parts);
 }
