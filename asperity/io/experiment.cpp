@@ -17,17 +17,14 @@ constexpr std::size_t most_surfaces = 1024;
 Result<std::string> read_text(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) {
-    return Error{ErrorCode::file_missing, "is a folder", file.string(), {}, "a scene file (JSON)"};
+    return refused_file(ErrorCode::file_missing, "is a folder", file.string(), "a scene file (JSON)");
   }
   std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    return Error{ErrorCode::file_missing,
-                 "cannot be read: no such file, or no permission",
-                 file.string(),
-                 {},
-                 "a scene file (JSON)"};
-  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  return text;
+  if (!stream) {
+    return refused_file(ErrorCode::file_missing, "cannot be read: no such file, or no permission", file.string(),
+                        "a scene file (JSON)");
+  }
+  return std::string{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 /// Bounds of the base meshes in the world frame: what strokes are laid over and shares refer to.
@@ -236,10 +233,10 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   }
   ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), settings, std::move(effects)));
   if (progress) progress("laying the stroke", 0.0);
-  Result<StrokePath> path = build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene));
-  if (!path) return std::move(path).error().at("stroke");
+  ASPERITY_TRY(StrokePath path,
+               at_place(build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene)), "stroke"));
   for (const Instance& instance : scene.instances())
-    note_rendering(instance, in_scene(scene.settings().view, *path), stroke.value.speed / scene.settings().view.zoom,
+    note_rendering(instance, in_scene(scene.settings().view, path), stroke.value.speed / scene.settings().view.zoom,
                    probe.value.rate, context);
 
   root.write("device", std::move(device.canonical));
@@ -257,7 +254,7 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
                         probe.value.simulated,
                         probe.value.rate,
                         std::move(stroke.value),
-                        std::move(*path),
+                        std::move(path),
                         std::move(context.notes),
                         root.canonical().dump(2, ' ', false, SceneJson::error_handler_t::replace)};
   return experiment;
@@ -274,14 +271,11 @@ Result<Experiment> parse_experiment(std::string_view json, const std::filesystem
                                     const Progress& progress) {
   try {
     ASPERITY_TRY(const SceneJson parsed, parse_scene_json(json, name));
-    Result<Experiment> experiment =
-        build_experiment(parsed, folder, std::filesystem::path(name).stem().string(), progress);
-    if (!experiment) return std::move(experiment).error().in_file(name);
-    return experiment;
+    return in_file(build_experiment(parsed, folder, std::filesystem::path(name).stem().string(), progress), name);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", name, {}, "a smaller scene"};
+    return refused_file(ErrorCode::too_large, "needs more memory than there is", name, "a smaller scene");
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::bad_value, std::string("cannot be used: ") + failure.what(), name, {}, {}};
+    return refused_file(ErrorCode::bad_value, std::string("cannot be used: ") + failure.what(), name);
   }
 }
 

@@ -152,11 +152,9 @@ Result<BakedFeatures> bake_features(const TriangleMesh& mesh, const std::vector<
   ASPERITY_TRY(const Side v, side_of(lower.y(), upper.y(), all.period.y(), all.wave.y(), repeats, place));
   const Vec2 from(u.lower, v.lower);
   const Vec2 size = Vec2(u.upper, v.upper) - from;
-  Result<HeightMap> heights =
-      bake(features, from, from + size, u.texels, v.texels, repeats ? Wrap::repeat : Wrap::clamp);
-  if (!heights) return std::move(heights).error().at(place);
-  Result<Mesostructure> maps = Mesostructure::build(std::move(*heights), size);
-  if (!maps) return std::move(maps).error().at(place);
+  const Wrap wrap = repeats ? Wrap::repeat : Wrap::clamp;
+  ASPERITY_TRY(HeightMap heights, at_place(bake(features, from, from + size, u.texels, v.texels, wrap), place));
+  ASPERITY_TRY(Mesostructure maps, at_place(Mesostructure::build(std::move(heights), size), place));
 
   MeshSource source;
   source.positions.assign(mesh.positions().begin(), mesh.positions().end());
@@ -169,7 +167,7 @@ Result<BakedFeatures> bake_features(const TriangleMesh& mesh, const std::vector<
     source.corner_uvs.push_back(uvs);
   }
   ASPERITY_TRY(TriangleMesh worn, TriangleMesh::build(std::move(source)));
-  return BakedFeatures{std::move(worn), std::make_shared<const Mesostructure>(std::move(*maps))};
+  return BakedFeatures{std::move(worn), std::make_shared<const Mesostructure>(std::move(maps))};
 }
 
 }  // namespace asperity

@@ -95,13 +95,12 @@ class CoatReader {
     reader_.refuse({"repeat"}, "by the triplanar mapping (\"tile\" is the size of one repeat)");
     constexpr double share = 0.25;  // four repeats over the object
     const SceneJson* given = reader_.raw("tile");
-    const bool pair = given != nullptr && given->is_array();
     Vec2 tile = Vec2::Zero();
-    if (pair) {
+    if (given != nullptr && given->is_array()) {
       tile = reader_.pair("tile", Dimension::length, Vec2::Ones(), Range::positive());
     } else if (given == nullptr && source_.sidecar()) {
       tile = source_.tile();
-      reader_.write("tile", SceneJson::array({tile.x(), tile.y()}));
+      reader_.write("tile", tile);
       context_.note(fmt::format("coat: one repeat is {} x {} from {}", format_length(tile.x()), format_length(tile.y()),
                                 source_.sidecar()->file));
     } else {
@@ -120,16 +119,11 @@ class CoatReader {
   void read_repeat() {
     const SceneJson* given = reader_.raw("repeat");
     if (given != nullptr && given->is_array()) {
-      for (std::size_t i = 0; i < 2 && given->size() == 2; ++i) {
-        if (!(*given)[i].is_number() || !((*given)[i].get<double>() > 0.0)) {
-          reader_.fail("repeat", "is no pair of numbers above 0", "a number above 0, or two [along s, along t]");
-          return;
-        }
-        repeat_[static_cast<int>(i)] = (*given)[i].get<double>();
-      }
-      if (given->size() != 2)
-        reader_.fail("repeat", fmt::format("has {} numbers", given->size()),
-                     "a number above 0, or two [along s, along t]");
+      const char* accepted = "a number above 0, or two [along s, along t]";
+      if (given->size() != 2) return reader_.fail("repeat", fmt::format("has {} numbers", given->size()), accepted);
+      if (are_numbers(*given, 2)) repeat_ = {(*given)[0].get<double>(), (*given)[1].get<double>()};
+      if (!are_numbers(*given, 2) || !(repeat_.minCoeff() > 0.0))
+        reader_.fail("repeat", "is no pair of numbers above 0", accepted);
       reader_.write("repeat", *given);
       return;
     }
@@ -158,29 +152,24 @@ class CoatReader {
     const bool map = reader_.choice("normals", sources, 0) == 1;
     ASPERITY_CHECK(reader_.status());
     if (!map) return Mesostructure::build(std::move(heights), tile);
-    Result<NormalMap> normals = NormalMap::build(heights, tile);
-    if (!normals) return std::move(normals).error().at(reader_.place_of("normals"));
-    return Mesostructure::build(std::move(heights), std::move(*normals), tile);
+    ASPERITY_TRY(NormalMap normals, at_place(NormalMap::build(heights, tile), reader_.place_of("normals")));
+    return Mesostructure::build(std::move(heights), std::move(normals), tile);
   }
 
   Result<Mesostructure> with_normals(HeightMap heights, const Vec2& tile) {
     if (reader_.raw("normal_map") == nullptr) return with_own_normals(std::move(heights), tile);
     reader_.refuse({"normals"}, "beside normal_map");
     const std::string name = reader_.text("normal_map", "");
+    const std::string place = reader_.place_of("normal_map");
     const auto green = reader_.choice("green", GreenConvention::up);
     ASPERITY_CHECK(reader_.status());
     const std::filesystem::path path = context_.resolve(name);
     reader_.write("normal_map", path.string());
     if (context_.progress) context_.progress("reading normal map", 0.0);
-    Result<Image> image = read_image(path);
-    if (!image) {
-      Error error = std::move(image).error().in_file(path.string());
-      if (error.place.empty()) error.place = reader_.place_of("normal_map");
-      return error;
-    }
-    Result<NormalMap> normals = NormalMap::build(*image, {green, wrap_, NormalFilter::bilinear});
+    ASPERITY_TRY(const Image image, in_file(read_image(path), path.string(), place));
+    Result<NormalMap> normals = NormalMap::build(image, {green, wrap_, NormalFilter::bilinear});
     if (!normals) {
-      Error error = std::move(normals).error().in_file(path.string()).at(reader_.place_of("normal_map"));
+      Error error = std::move(normals).error().in_file(path.string()).at(place);
       error.code = ErrorCode::bad_map;
       return error;
     }

@@ -8,16 +8,18 @@ namespace {
 
 constexpr double full_rate = 1e6;
 
-/// The text form of a part that may be a text or an object; empty when it is an object.
-Result<std::string> name_of(const SceneJson& json, const std::string& place, const char* accepted) {
-  if (json.is_string()) return json.get<std::string>();
-  if (json.is_object()) return std::string();
-  return refused(ErrorCode::bad_type, std::string("is ") + json_type(json), place, accepted);
+/// What a text names, and nothing where `json` is an object.
+template <class T>
+Result<std::optional<T>> read_name(const SceneJson& json, const std::string& place, const char* accepted,
+                                   Result<T> (*find)(std::string_view)) {
+  if (json.is_object()) return std::optional<T>();
+  if (!json.is_string()) return refused(ErrorCode::bad_type, std::string("is ") + json_type(json), place, accepted);
+  ASPERITY_TRY(T found, at_place(find(json.get_ref<const std::string&>()), place));
+  return std::optional<T>(std::move(found));
 }
 
-IdealProbeSettings read_ideal(const SceneJson* json, const std::string& place, double stiffness, ObjectReader& parent) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, place, "ideal probe");
+IdealProbeSettings read_ideal(double stiffness, ObjectReader& parent) {
+  ObjectReader reader(parent.raw("ideal"), parent.place_of("ideal"), "ideal probe");
   IdealProbeSettings s;
   s.stiffness_estimate = reader.quantity("stiffness_estimate", Dimension::stiffness, stiffness, Range::positive());
   s.bandwidth = reader.quantity("bandwidth", Dimension::frequency, s.bandwidth, Range::positive());
@@ -26,9 +28,8 @@ IdealProbeSettings read_ideal(const SceneJson* json, const std::string& place, d
   return s;
 }
 
-SimulatedDeviceSettings read_dynamic(const SceneJson* json, const std::string& place, ObjectReader& parent) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, place, "dynamic probe");
+SimulatedDeviceSettings read_dynamic(ObjectReader& parent) {
+  ObjectReader reader(parent.raw("dynamic"), parent.place_of("dynamic"), "dynamic probe");
   SimulatedDeviceSettings s;
   s.force_bandwidth = reader.quantity("force_bandwidth", Dimension::frequency, s.force_bandwidth, Range::positive());
   s.reach = reader.quantity("reach", Dimension::length, s.reach, Range::positive());
@@ -52,16 +53,12 @@ std::filesystem::path SceneContext::resolve(const std::string& name) const {
 Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::string& place) {
   static const SceneJson by_default = "phantom-desktop";
   if (json == nullptr) json = &by_default;
-  ASPERITY_TRY(const std::string name, name_of(*json, place, "a profile's name or an object"));
-  if (!name.empty() || json->is_string()) {
-    Result<DeviceProfile> profile = find_profile(name);
-    if (!profile) return std::move(profile).error().at(place);
-    return ScenePart<DeviceProfile>{*profile, profile->name};
-  }
+  ASPERITY_TRY(const auto named, read_name(*json, place, "a profile's name or an object", find_profile));
+  if (named) return ScenePart<DeviceProfile>{*named, named->name};
   ObjectReader reader(*json, place, "device");
   Result<DeviceProfile> base = find_profile(reader.text("profile", "phantom-desktop"));
-  if (!base && !reader.failed()) return std::move(base).error().at(place + ".profile");
-  DeviceProfile p = base ? *base : DeviceProfile{};
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(DeviceProfile p, at_place(std::move(base), place + ".profile"));
   p.max_force = reader.quantity("max_force", Dimension::force, p.max_force, Range::positive());
   p.max_stiffness = reader.quantity("max_stiffness", Dimension::stiffness, p.max_stiffness, Range::positive());
   p.max_damping = reader.quantity("max_damping", Dimension::damping, p.max_damping, Range::not_negative());
@@ -75,43 +72,38 @@ Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::s
   p.rate = reader.quantity("rate", Dimension::frequency, p.rate, Range{0.0, full_rate, true});
   p.admittance = reader.boolean("admittance", p.admittance);
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate_profile(p); !valid) return std::move(valid).error().at(place);
+  ASPERITY_CHECK(at_place(validate_profile(p), place));
   return ScenePart<DeviceProfile>{p, std::move(reader.canonical())};
 }
 
 Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::string& place) {
   static const SceneJson by_default = "default";
   if (json == nullptr) json = &by_default;
-  ASPERITY_TRY(const std::string name, name_of(*json, place, "a hand's name or an object"));
-  if (!name.empty() || json->is_string()) {
-    Result<HandImpedance> hand = find_hand(name);
-    if (!hand) return std::move(hand).error().at(place);
-    return ScenePart<HandImpedance>{*hand, hand->name};
-  }
+  ASPERITY_TRY(const auto named, read_name(*json, place, "a hand's name or an object", find_hand));
+  if (named) return ScenePart<HandImpedance>{*named, named->name};
   ObjectReader reader(*json, place, "hand");
   Result<HandImpedance> base = find_hand(reader.text("preset", "default"));
-  if (!base && !reader.failed()) return std::move(base).error().at(place + ".preset");
-  HandImpedance h = base ? *base : HandImpedance{};
+  ASPERITY_CHECK(reader.status());
+  ASPERITY_TRY(HandImpedance h, at_place(std::move(base), place + ".preset"));
   h.mass = reader.quantity("mass", Dimension::mass, h.mass, Range::positive());
   h.damping = reader.quantity("damping", Dimension::damping, h.damping, Range::not_negative());
   h.stiffness = reader.quantity("stiffness", Dimension::stiffness, h.stiffness, Range::positive());
   h.lateral_limit = reader.quantity("lateral_limit", Dimension::force, h.lateral_limit, Range::positive());
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate_hand(h); !valid) return std::move(valid).error().at(place);
+  ASPERITY_CHECK(at_place(validate_hand(h), place));
   return ScenePart<HandImpedance>{h, std::move(reader.canonical())};
 }
 
 Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::string& place,
                                             const DeviceProfile& device, double stiffness) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, place, "probe");
+  ObjectReader reader(json, place, "probe");
   ProbeSettings probe;
   probe.dynamic = reader.choice("kind", ProbeKind::ideal) == ProbeKind::dynamic;
   probe.radius = reader.quantity("radius", Dimension::length, 0.0, Range::not_negative());
   probe.tip = reader.quantity("tip", Dimension::length, 0.0, Range::not_negative());
   probe.rate = reader.quantity("rate", Dimension::frequency, device.rate, Range{0.0, full_rate, true});
-  probe.ideal = read_ideal(reader.raw("ideal"), place + ".ideal", stiffness, reader);
-  probe.simulated = read_dynamic(reader.raw("dynamic"), place + ".dynamic", reader);
+  probe.ideal = read_ideal(stiffness, reader);
+  probe.simulated = read_dynamic(reader);
   ASPERITY_CHECK(reader.status());
   return ScenePart<ProbeSettings>{probe, std::move(reader.canonical())};
 }

@@ -13,32 +13,25 @@ constexpr std::size_t most_effects = 64;
 Result<TransferFunction> read_transfer(ObjectReader& reader) {
   const char* accepted = "an array of points [value, answer]";
   const SceneJson* json = reader.raw("transfer");
-  if (json == nullptr) {
-    reader.fail("transfer", "is missing", accepted);
-  } else if (!json->is_array()) {
-    reader.fail_type("transfer", *json, accepted);
-  }
+  reader.require("transfer", accepted);
+  if (json != nullptr && !json->is_array()) reader.fail_type("transfer", *json, accepted);
   ASPERITY_CHECK(reader.status());
   std::vector<TransferFunction::Point> points;
   for (std::size_t i = 0; i < json->size(); ++i) {
     const SceneJson& point = (*json)[i];
-    if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
-      return refused(ErrorCode::bad_type, "is no pair of numbers",
-                     fmt::format("{}[{}]", reader.place_of("transfer"), i), accepted);
-    }
+    if (!are_numbers(point, 2))
+      return refused(ErrorCode::bad_type, "is no pair of numbers", reader.place_of("transfer", i), accepted);
     points.push_back({point[0].get<double>(), point[1].get<double>()});
   }
-  Result<TransferFunction> transfer = TransferFunction::build(std::move(points));
-  if (!transfer) return std::move(transfer).error().at(reader.place());
   reader.write("transfer", *json);
-  return transfer;
+  return at_place(TransferFunction::build(std::move(points)), reader.place());
 }
 
 Result<ScenePart<FieldEffect>> read_effect(const SceneJson& json, const std::string& place, SceneContext& context) {
   ObjectReader reader(json, place, "effect");
   ASPERITY_CHECK(reader.status());
   FieldEffect effect;
-  if (!reader.has("type")) reader.fail("type", "is missing", "a kind of effect");
+  reader.require("type", "a kind of effect");
   effect.kind = reader.choice("type", FieldEffectKind::viscosity);
   const std::string kind = to_string(effect.kind);
   const bool scalars =
@@ -57,9 +50,9 @@ Result<ScenePart<FieldEffect>> read_effect(const SceneJson& json, const std::str
   ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));
   effect.field = volume.field;
   effect.name = reader.text("name", kind + " of " + volume.name);
-  ASPERITY_TRY(effect.world_from_object, read_pose(reader.raw("pose"), reader));
+  ASPERITY_TRY(effect.world_from_object, read_pose(reader));
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate(effect); !valid) return std::move(valid).error().at(place);
+  ASPERITY_CHECK(at_place(validate(effect), place));
   return ScenePart<FieldEffect>{std::move(effect), std::move(reader.canonical())};
 }
 

@@ -16,13 +16,10 @@ class FrictionReader {
   FrictionReader(ObjectReader& reader, FrictionKind kind) : reader_(reader) { law_.kind = kind; }
 
   FrictionLaw read() {
-    for (const SceneObjectKeys& entry : scene_object_keys()) {
-      if (entry.object != "friction") continue;
-      for (const std::string& key : entry.keys) {
-        if (key != "law" && !takes(key) && !(key == "formulation" && printed_otherwise()))
-          reader_.refuse({key}, fmt::format("by the friction law \"{}\"", friction_name(law_.kind)));
-      }
-    }
+    const auto read = [&](const std::string& key) {
+      return key == "law" || takes(key) || (key == "formulation" && printed_otherwise());
+    };
+    reader_.refuse_unless(read, fmt::format("by the friction law \"{}\"", friction_name(law_.kind)));
     if (printed_otherwise()) law_.formulation = reader_.choice("formulation", Formulation::consistent);
     number("stiffness", Dimension::stiffness, Range::not_negative(), law_.stiffness);
     number("damping", Dimension::damping, Range::not_negative(), law_.damping);
@@ -59,13 +56,13 @@ Status read_law(const SceneJson& json, ObjectReader& material, Material& into) {
   }
   const SceneJson wrapped = json.is_string() ? SceneJson{{"law", json}} : json;
   ObjectReader reader(wrapped, material.place_of("friction"), "friction");
-  if (!reader.failed() && !reader.has("law")) reader.fail("law", "is missing", "a friction law's name");
+  reader.require("law", "a friction law's name");
   const auto kind = reader.choice("law", FrictionKind::implicit_coulomb);
   ASPERITY_CHECK(reader.status());
   into.friction = FrictionReader(reader, kind).read();
   into.friction_named = true;
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate(into.friction); !valid) return std::move(valid).error().at(reader.place());
+  ASPERITY_CHECK(at_place(validate(into.friction), reader.place()));
   material.take("friction", std::move(reader));
   return success();
 }
@@ -87,7 +84,7 @@ Result<FrictionMap> read_friction_map(const SceneJson& json, ObjectReader& mater
   const double low = reader.number("low", 0.0, Range{0.0, 1e3});
   const double high = reader.number("high", 1.0, Range{0.0, 1e3});
   FrictionMap map;
-  if (!reader.has("tile")) reader.fail("tile", "is missing", "size of one repeat: a length above 0, or two");
+  reader.require("tile", "size of one repeat: a length above 0, or two");
   map.tile = reader.pair("tile", Dimension::length, map.tile, Range::positive());
   ASPERITY_CHECK(reader.status());
   // Nothing between two factors may lie outside them.

@@ -74,30 +74,26 @@ Result<CoatSource> gltf_coat(const std::filesystem::path& path, const MeshSource
   if (context.progress) context.progress("reading the materials of the glTF file", 0.0);
   ASPERITY_TRY(const GltfModel model, read_gltf_model(path));
   ASPERITY_TRY(const std::vector<std::uint32_t> from, source_of_faces(source, mesh));
-  if (model.materials.empty()) {
-    return Error{
-        ErrorCode::mismatch, "has no material", path.string(), {}, "a glTF file with materials, or height_map"};
+  const std::size_t count = model.materials.size();
+  if (count == 0) {
+    return refused_file(ErrorCode::mismatch, "has no material", path.string(),
+                        "a glTF file with materials, or height_map");
   }
-  if (model.materials.size() > std::numeric_limits<std::uint8_t>::max()) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("has {} materials", model.materials.size()),
-                 path.string(),
-                 {},
-                 "at most 255"};
-  }
+  if (count > std::numeric_limits<std::uint8_t>::max())
+    return refused_file(ErrorCode::too_large, fmt::format("has {} materials", count), path.string(), "at most 255");
   CoatParts parts;
   for (const GltfMaterial& material : model.materials) {
-    Result<Mesostructure> maps = mesostructure_of(material, texture_unit(mesh), scale, context);
-    if (!maps) return std::move(maps).error().in_file(path.string());
-    parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(*maps)));
+    ASPERITY_TRY(Mesostructure maps,
+                 in_file(mesostructure_of(material, texture_unit(mesh), scale, context), path.string()));
+    parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(maps)));
   }
   const bool one = parts.maps.size() == 1;
   if (!one) {
     for (const std::uint32_t triangle : from)
       parts.map_of_face.push_back(static_cast<std::uint8_t>(model.material_of_triangle[triangle]));
   }
-  const bool haptic = std::any_of(model.materials.begin(), model.materials.end(),
-                                  [](const GltfMaterial& material) { return material.stiffness || material.friction; });
+  const auto counted = [&](const auto& have) { return std::ranges::count_if(model.materials, have); };
+  const bool haptic = counted([](const GltfMaterial& material) { return material.stiffness || material.friction; }) > 0;
   if (haptic && one) {
     ASPERITY_TRY(parts.materials, maps_of(model.materials.front(), own));
     if (model.materials.front().friction && own.static_friction == 0.0)
@@ -106,19 +102,15 @@ Result<CoatSource> gltf_coat(const std::filesystem::path& path, const MeshSource
     context.note(
         fmt::format("glTF: maps of stiffness and friction are felt where a mesh has one material, and it has {}: they "
                     "are left out",
-                    model.materials.size()));
+                    count));
   }
   CoatSettings settings;
   settings.mapping = Mapping::uv;
   settings.stitching = stitching;
-  std::size_t heights = 0;
-  std::size_t normals = 0;
-  for (const GltfMaterial& material : model.materials) {
-    heights += material.height ? 1U : 0U;
-    normals += material.normals ? 1U : 0U;
-  }
-  context.note(fmt::format("coat: {} materials of the glTF file, {} with heights, {} with normals{}",
-                           model.materials.size(), heights, normals,
+  const auto heights = counted([](const GltfMaterial& material) { return material.height.has_value(); });
+  const auto normals = counted([](const GltfMaterial& material) { return material.normals.has_value(); });
+  context.note(fmt::format("coat: {} materials of the glTF file, {} with heights, {} with normals{}", count, heights,
+                           normals,
                            heights == 0 ? " (felt by the law \"force-shading\"; the proxy feels the geometry)" : ""));
   if (heights > 0 && scale != 1.0)
     context.note(fmt::format("coat: heights are scaled with the model, by {:.4g}", scale));

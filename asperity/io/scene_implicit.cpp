@@ -121,28 +121,25 @@ Result<std::vector<MaterialBrush>> read_brushes(const SceneJson* json, ObjectRea
   ASPERITY_CHECK(implicit.status());
   SceneJson canonical = SceneJson::array();
   for (std::size_t i = 0; i < json->size(); ++i) {
-    ObjectReader reader((*json)[i], fmt::format("{}[{}]", implicit.place_of("materials"), i), "material brush");
+    ObjectReader reader((*json)[i], implicit.place_of("materials", i), "material brush");
     MaterialBrush brush;
-    if (!reader.failed() && !reader.has("centre")) reader.fail("centre", "is missing", "three lengths");
+    reader.require("centre", "three lengths");
     brush.centre = reader.lengths("centre", Vec3::Zero());
     brush.radius = reader.quantity("radius", Dimension::length, 0.005, Range::positive());
     brush.falloff = reader.quantity("falloff", Dimension::length, 0.0, Range{0.0, brush.radius});
-    const auto channel = [&](const char* key, float& value, const std::optional<double>& given) {
-      if (given) value = static_cast<float>(*given);
-      return reader.has(key);
+    bool any = false;
+    const auto channel = [&](const char* key, Dimension dimension, const Range& range, float& value) {
+      if (!reader.has(key)) return;
+      any = true;
+      value = static_cast<float>(dimension == Dimension::ratio ? reader.number(key, 0.0, range)
+                                                               : reader.quantity(key, dimension, 0.0, range));
     };
-    const auto plain = [&](const char* key) {
-      return reader.has(key) ? std::optional<double>(reader.number(key, 0.0, Range::not_negative())) : std::nullopt;
-    };
-    bool any = channel("stiffness", brush.material.stiffness,
-                       reader.optional_quantity("stiffness", Dimension::stiffness, Range::positive()));
-    any = channel("damping", brush.material.damping,
-                  reader.optional_quantity("damping", Dimension::damping, Range::not_negative())) ||
-          any;
-    any = channel("static_friction", brush.material.static_friction, plain("static_friction")) || any;
-    any = channel("dynamic_friction", brush.material.dynamic_friction, plain("dynamic_friction")) || any;
-    any = channel("roughness", brush.material.roughness, plain("roughness")) || any;
-    if (!any && !reader.failed())
+    channel("stiffness", Dimension::stiffness, Range::positive(), brush.material.stiffness);
+    channel("damping", Dimension::damping, Range::not_negative(), brush.material.damping);
+    channel("static_friction", Dimension::ratio, Range::not_negative(), brush.material.static_friction);
+    channel("dynamic_friction", Dimension::ratio, Range::not_negative(), brush.material.dynamic_friction);
+    channel("roughness", Dimension::ratio, Range::not_negative(), brush.material.roughness);
+    if (!any)
       reader.fail("stiffness", "is missing, and so is every other property", "at least one property of a material");
     ASPERITY_CHECK(reader.status());
     canonical.push_back(reader.canonical());
@@ -223,27 +220,25 @@ class ImplicitReader {
     shortest_ = texture.wavelength;
     if (texture.height) ASPERITY_CHECK(lay_texture(texture.height));
     instance.name = surface_.text("name", name_);
-    instance.sides = surface_.choice_or_auto<Sides>("sides").value_or(Sides::front);
+    instance.sides = surface_.choice_or_auto<Sides>("sides");
     ASPERITY_CHECK(surface_.status());
     parts_.mesh = mesh_;
-    Result<ImplicitSurface> built = ImplicitSurface::build(std::move(parts_));
-    if (!built) return place_error(std::move(built).error());
-    note_limits(*built, instance.sides.value_or(Sides::front));
-    instance.surface = std::make_shared<const ImplicitSurface>(std::move(built).value());
+    ASPERITY_TRY(ImplicitSurface built, placed(ImplicitSurface::build(std::move(parts_))));
+    note_limits(built, instance.sides.value_or(Sides::front));
+    instance.surface = std::make_shared<const ImplicitSurface>(std::move(built));
     surface_.take("implicit", std::move(reader_));
     return success();
   }
 
  private:
-  Error place_error(Error error) const {
-    if (error.place.empty() || error.place == "implicit") {
-      error.place = surface_.place_of("implicit");
-    } else if (error.place.front() == '[') {
-      error.place = reader_.place_of("materials") + error.place;
-    } else {
-      error.place = reader_.place_of(error.place);
-    }
-    return error;
+  /// The same, an error by the key that a scene writes.
+  template <class T>
+  Result<T> placed(Result<T> result) const {
+    if (result) return result;
+    std::string& place = result.error().place;
+    if (place == "implicit") place.clear();
+    if (place.starts_with('[')) place.insert(0, "materials");
+    return at_place(std::move(result), surface_.place_of("implicit"));
   }
   void note(const std::string& text) { context_.note(fmt::format("implicit \"{}\": {}", name_, text)); }
 
@@ -273,10 +268,10 @@ class ImplicitReader {
     if (const SceneJson* json = surface_.raw("coat")) {
       const std::string place = surface_.place_of("coat");
       ASPERITY_TRY(ScenePart<CoatSource> read, read_coat(*json, place, mesh_->mesh(), context_));
-      Result<Coat> coat = Coat::build(mesh_->mesh(), std::move(read.value.parts), read.value.settings);
-      if (!coat) return std::move(coat).error().at(place);
+      ASPERITY_TRY(Coat coat,
+                   at_place(Coat::build(mesh_->mesh(), std::move(read.value.parts), read.value.settings), place));
       surface_.write("coat", std::move(read.canonical));
-      coat_ = std::make_unique<Coat>(std::move(*coat));
+      coat_ = std::make_unique<Coat>(std::move(coat));
     }
     return success();
   }
@@ -288,22 +283,21 @@ class ImplicitReader {
     const Box& bounds = mesh_->mesh().bounds();
     const ConversionSettings settings = read_conversion(reader_, bounds, reach);
     ASPERITY_CHECK(reader_.status());
-    Result<ConvertedMesh> converted = convert_mesh(mesh_->index(), settings, context_.progress);
-    if (!converted) return place_error(std::move(converted).error());
-    const ConversionReport& report = converted->report;
+    ASPERITY_TRY(ConvertedMesh converted, placed(convert_mesh(mesh_->index(), settings, context_.progress)));
+    const ConversionReport& report = converted.report;
     for (const std::string& text : report.notes) note(text);
     // A budget is met by a voxel, which then stands for it.
     // In one order, whether they were given or chosen.
     for (const char* key : {"budget", "band_outside", "band_inside", "inside", "shell_thickness"})
       reader_.canonical().erase(key);
     if (settings.budget_bytes > 0) reader_.write("voxel", report.voxel);
-    reader_.write("band_outside", converted->grid.outside());
+    reader_.write("band_outside", converted.grid.outside());
     const bool all = !std::isfinite(settings.band_inside);
-    reader_.write("band_inside", all ? SceneJson("all") : SceneJson(-converted->grid.inside()));
+    reader_.write("band_inside", all ? SceneJson("all") : SceneJson(-converted.grid.inside()));
     reader_.write("inside", to_string(report.rule));
     if (report.rule == InsideRule::shell) reader_.write("shell_thickness", report.shell_thickness);
     parts_.shell_thickness = report.shell_thickness;
-    parts_.grid = std::make_shared<const SparseGrid>(std::move(converted).value().grid);
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(converted.grid));
     return success();
   }
 
@@ -316,17 +310,16 @@ class ImplicitReader {
     ASPERITY_CHECK(surface_.status());
     const std::filesystem::path path = context_.resolve(file);
     reader_.write("file", path.string());
-    Result<SparseFile> read = read_sparse(path, {grid}, context_.progress);
-    if (!read) return std::move(read).error().in_file(path.string());
+    ASPERITY_TRY(SparseFile read, in_file(read_sparse(path, {grid}, context_.progress), path.string()));
     if (name_.empty()) name_ = path.stem().string();
-    for (const std::string& text : read->notes) note(text);
-    reader_.write("grid", read->grid);
+    for (const std::string& text : read.notes) note(text);
+    reader_.write("grid", read.grid);
     if (mesh_ == nullptr) {
       const bool stated = surface_.has("units") || surface_.has("fit");
       const double unit = read_units(surface_, true);
       const double size = read_fit(surface_, !stated, context_);
       ASPERITY_CHECK(surface_.status());
-      const Box bounds = solid_bounds(read->source);
+      const Box bounds = solid_bounds(read.source);
       const double largest = bounds.empty() ? 0.0 : unit * bounds.extent().maxCoeff();
       const bool fitted = size > 0.0 && largest > 0.0;
       scale_ = unit * (fitted ? size / largest : 1.0);
@@ -335,16 +328,15 @@ class ImplicitReader {
         note(fmt::format("scaled by {:.4g} to a largest side of {} (\"units\" or \"fit\" choose otherwise)", scale_,
                          format_length(size)));
       }
-    } else if (read->has_faces && read->mesh_faces != mesh_->mesh().triangles().size()) {
+    } else if (read.has_faces && read.mesh_faces != mesh_->mesh().triangles().size()) {
       return Error{ErrorCode::mismatch,
-                   fmt::format("was made from a mesh of {} triangles, and \"{}\" has {}", read->mesh_faces, name_,
+                   fmt::format("was made from a mesh of {} triangles, and \"{}\" has {}", read.mesh_faces, name_,
                                mesh_->mesh().triangles().size()),
                    path.string(), reader_.place_of("file"), "the mesh that it was made from"};
     }
-    place_source(read->source, scale_, centre_);
-    Result<SparseGrid> built = SparseGrid::build(std::move(read->source));
-    if (!built) return std::move(built).error().in_file(path.string());
-    parts_.grid = std::make_shared<const SparseGrid>(std::move(built).value());
+    place_source(read.source, scale_, centre_);
+    ASPERITY_TRY(SparseGrid built, in_file(SparseGrid::build(std::move(read.source)), path.string()));
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(built));
     return success();
   }
 
@@ -356,9 +348,8 @@ class ImplicitReader {
     point.static_friction = static_cast<float>(own.static_friction);
     point.dynamic_friction = static_cast<float>(own.dynamic_friction);
     point.roughness = 1.0F;
-    Result<SparseGrid> grid = painted(*parts_.grid, brushes, point);
-    if (!grid) return place_error(std::move(grid).error());
-    parts_.grid = std::make_shared<const SparseGrid>(std::move(grid).value());
+    ASPERITY_TRY(SparseGrid grid, placed(painted(*parts_.grid, brushes, point)));
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(grid));
     return success();
   }
 
@@ -366,18 +357,17 @@ class ImplicitReader {
     const auto mode = reader_.choice("redistance", Redistancing::redistanced);
     ASPERITY_CHECK(reader_.status());
     if (context_.progress) context_.progress("laying the texture", 0.0);
-    Result<TexturedPotential> result = textured(*parts_.grid, height, mode, context_.progress);
-    if (!result) return place_error(std::move(result).error());
+    ASPERITY_TRY(TexturedPotential result, placed(textured(*parts_.grid, height, mode, context_.progress)));
     note(fmt::format("texture of {} to {}; {}: the potential is off a distance by at most {}, {} rms (before: {}, {})",
-                     format_length(result->lowest), format_length(result->highest), to_string(mode),
-                     format_length(result->largest_error), format_length(result->rms_error),
-                     format_length(result->largest_error_before), format_length(result->rms_error_before)));
+                     format_length(result.lowest), format_length(result.highest), to_string(mode),
+                     format_length(result.largest_error), format_length(result.rms_error),
+                     format_length(result.largest_error_before), format_length(result.rms_error_before)));
     if (shortest_ > 0.0 && shortest_ < 6.0 * parts_.grid->voxel()) {
       note(fmt::format("a wavelength of {} is under six voxels of {}: it is felt weaker than asked for",
                        format_length(shortest_), format_length(parts_.grid->voxel())));
     }
     parts_.untextured = parts_.grid;
-    parts_.grid = std::make_shared<const SparseGrid>(std::move(result).value().grid);
+    parts_.grid = std::make_shared<const SparseGrid>(std::move(result.grid));
     return success();
   }
 

@@ -27,14 +27,12 @@ Result<std::vector<double>> column_means(const Image& image, Channel channel) {
 Result<std::vector<double>> read_blend_map(const SceneJson& json, const std::string& place, const SceneContext& context,
                                            ObjectReader& law) {
   ObjectReader reader(json, place, "blend map");
-  const std::string file = reader.text("image", "");
-  if (!reader.failed() && file.empty()) reader.fail("image", "is missing", "an image file");
+  const std::string file = reader.required_text("image", "an image file");
   const auto channel = reader.choice("channel", Channel::automatic);
   ASPERITY_CHECK(reader.status());
   const std::string path = context.resolve(file).string();
   ASPERITY_TRY(const Image image, read_image(path));
-  Result<std::vector<double>> means = column_means(image, channel);
-  if (!means) return std::move(means).error().in_file(path);
+  ASPERITY_TRY(std::vector<double> means, in_file(column_means(image, channel), path));
   reader.write("image", path);
   law.take("blend", std::move(reader));
   return means;
@@ -49,8 +47,8 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
   } else if (blend != nullptr && blend->is_array()) {
     for (std::size_t i = 0; i < blend->size(); ++i) {
       if (!(*blend)[i].is_number()) {
-        return refused(ErrorCode::bad_type, fmt::format("is {}", json_type((*blend)[i])),
-                       fmt::format("{}[{}]", reader.place_of("blend"), i), "weights from 0 to 1");
+        return refused(ErrorCode::bad_type, fmt::format("is {}", json_type((*blend)[i])), reader.place_of("blend", i),
+                       "weights from 0 to 1");
       }
       weights.push_back((*blend)[i].get<double>());
     }
@@ -66,11 +64,8 @@ Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind
 
 /// Refuses every option but those in `own`.
 void only(ObjectReader& reader, std::initializer_list<std::string_view> own, const std::string& who) {
-  for (const std::string_view key :
-       {"formulation", "rho", "blend", "edge_taper", "subdivisions", "influence_radius", "band", "largest_force",
-        "retarding", "reach", "magnitude", "depth_gain", "offset", "test_neighbours"}) {
-    if (std::find(own.begin(), own.end(), key) == own.end()) reader.refuse({key}, who);
-  }
+  reader.refuse_unless(
+      [&](const auto& key) { return key == "type" || std::find(own.begin(), own.end(), key) != own.end(); }, who);
 }
 
 Status read_mesostructure(ObjectReader& reader, const SceneContext& context, MesostructureLaw& law) {
@@ -117,59 +112,42 @@ SceneJson blend_json(Blend blend, const std::vector<double>& weights) {
 SceneJson law_json(const Law& law) {
   if (const CustomLaw* custom = custom_of(law)) return named_numbers_json(custom->name(), custom->numbers());
   SceneJson json = SceneJson::object();
+  json["type"] = law_name(in_formulation(law, Formulation::consistent));
+  const std::optional<Formulation> form = formulation_of(law);
+  const bool literal = form == Formulation::literal;
+  if (form) json["formulation"] = to_string(*form);
   if (const auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
-    json["type"] = "height-field";
-    json["formulation"] = to_string(height_field->formulation);
     json["edge_taper"] = height_field->edge_taper;
-  } else if (const auto* meso = std::get_if<MesostructureLaw>(&law)) {
-    json["type"] = "mesostructure";
-    json["formulation"] = to_string(meso->formulation);
-    if (meso->formulation == Formulation::literal) {
-      json["rho"] = meso->rho;
-      json["blend"] = blend_json(meso->blend, meso->blend_map);
-      json["test_neighbours"] = meso->test_neighbours;
-    }
-  } else if (const auto* shading = std::get_if<ForceShadingLaw>(&law)) {
-    json["type"] = "force-shading";
-    json["formulation"] = to_string(shading->formulation);
+  } else if (const auto* meso = std::get_if<MesostructureLaw>(&law); meso != nullptr && literal) {
+    json["rho"] = meso->rho;
+    json["blend"] = blend_json(meso->blend, meso->blend_map);
+    json["test_neighbours"] = meso->test_neighbours;
   } else if (const auto* avila = std::get_if<AvilaLaw>(&law)) {
-    json["type"] = "avila";
-    json["formulation"] = to_string(avila->formulation);
     json["band"] = avila->band;
     json["largest_force"] = avila->largest_force;
     json["retarding"] = avila->retarding;
   } else if (const auto* cross = std::get_if<CrossUncrossLaw>(&law)) {
-    json["type"] = "cross-uncross";
-    json["formulation"] = to_string(cross->formulation);
     json["retarding"] = cross->retarding;
-    if (cross->formulation == Formulation::literal) json["reach"] = cross->reach;
+    if (literal) json["reach"] = cross->reach;
   } else if (const auto* contact = std::get_if<VirtualContactPointLaw>(&law)) {
-    json["type"] = "virtual-contact-point";
-    json["formulation"] = to_string(contact->formulation);
-    if (contact->formulation == Formulation::literal) json["magnitude"] = to_string(contact->magnitude);
+    if (literal) json["magnitude"] = to_string(contact->magnitude);
     json["depth_gain"] = contact->depth_gain;
     json["offset"] = contact->offset;
   } else if (const auto* magnetic = std::get_if<MagneticLaw>(&law)) {
-    json["type"] = "magnetic";
-    json["formulation"] = to_string(magnetic->formulation);
     json["band"] = magnetic->band;
-  } else {
-    json["type"] = law_name(law);
-    if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
-      json["subdivisions"] = generated->subdivisions;
-      if (generated->influence_radius > 0.0) json["influence_radius"] = generated->influence_radius;
-    }
-    if (const auto* dense = std::get_if<DenseMeshLaw>(&law); dense != nullptr && dense->subdivisions > 0)
-      json["subdivisions"] = dense->subdivisions;
+  } else if (const auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
+    json["subdivisions"] = generated->subdivisions;
+    if (generated->influence_radius > 0.0) json["influence_radius"] = generated->influence_radius;
+  } else if (const auto* dense = std::get_if<DenseMeshLaw>(&law); dense != nullptr && dense->subdivisions > 0) {
+    json["subdivisions"] = dense->subdivisions;
   }
   return json;
 }
 
 Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place, const SceneContext& context) {
   if (json.is_string()) {
-    Result<Law> law = law_by_name(json.get_ref<const std::string&>());
-    if (!law) return std::move(law).error().at(place);
-    return ScenePart<Law>{*law, law_json(*law)};
+    ASPERITY_TRY(const Law law, at_place(law_by_name(json.get_ref<const std::string&>()), place));
+    return ScenePart<Law>{law, law_json(law)};
   }
   if (!json.is_object()) {
     return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, "a law's name or an object");
@@ -180,44 +158,41 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     const std::vector<std::string>& own = custom_law_names();
     if (std::find(own.begin(), own.end(), name) != own.end()) {
       ASPERITY_TRY(NamedNumbers numbers, read_named_numbers(json, place));
-      Result<Law> law = make_custom_law(name, std::move(numbers));
-      if (!law) return std::move(law).error().at(place);
-      return ScenePart<Law>{*law, law_json(*law)};
+      ASPERITY_TRY(const Law law, at_place(make_custom_law(name, std::move(numbers)), place));
+      return ScenePart<Law>{law, law_json(law)};
     }
     // Before its keys: of a law that nobody knows they say nothing.
-    if (Result<Law> known = law_by_name(name); !known) return std::move(known).error().at(place + ".type");
+    ASPERITY_CHECK(at_place(law_by_name(name), place + ".type"));
   }
   ObjectReader reader(json, place, "law");
   const std::string type = reader.text("type", "proxy");
   ASPERITY_CHECK(reader.status());
-  Result<Law> law = law_by_name(type);
-  if (!law) return std::move(law).error().at(place + ".type");
+  ASPERITY_TRY(Law law, at_place(law_by_name(type), place + ".type"));
   // Told by "formulation" or by a name that ends in "-literal", a form has the same options by default.
-  if (const std::optional<Formulation> named = formulation_of(*law)) {
-    *law = in_formulation(*law, reader.choice("formulation", *named));
-  }
-  if (auto* meso = std::get_if<MesostructureLaw>(&*law)) {
+  if (const std::optional<Formulation> named = formulation_of(law))
+    law = in_formulation(law, reader.choice("formulation", *named));
+  if (auto* meso = std::get_if<MesostructureLaw>(&law)) {
     ASPERITY_CHECK(read_mesostructure(reader, context, *meso));
-  } else if (std::holds_alternative<ForceShadingLaw>(*law)) {
+  } else if (std::holds_alternative<ForceShadingLaw>(law)) {
     only(reader, {"formulation"}, "by force shading");
-  } else if (auto* height_field = std::get_if<HeightFieldLaw>(&*law)) {
+  } else if (auto* height_field = std::get_if<HeightFieldLaw>(&law)) {
     only(reader, {"formulation", "edge_taper"}, "by a height-field law");
     height_field->edge_taper = reader.number("edge_taper", height_field->edge_taper, Range{0.0, 1.0 / 3.0});
-  } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&*law)) {
+  } else if (auto* generated = std::get_if<GeneratedGeometryLaw>(&law)) {
     read_generated(reader, *generated);
-  } else if (auto* dense = std::get_if<DenseMeshLaw>(&*law)) {
+  } else if (auto* dense = std::get_if<DenseMeshLaw>(&law)) {
     read_dense(reader, *dense);
-  } else if (auto* avila = std::get_if<AvilaLaw>(&*law)) {
+  } else if (auto* avila = std::get_if<AvilaLaw>(&law)) {
     only(reader, {"formulation", "band", "largest_force", "retarding"}, "by the law \"avila\"");
     avila->band = reader.number("band", avila->band, Range::not_negative());
     avila->largest_force = reader.quantity("largest_force", Dimension::force, avila->largest_force, Range::positive());
     avila->retarding = reader.quantity("retarding", Dimension::damping, avila->retarding, Range::not_negative());
-  } else if (auto* contact = std::get_if<VirtualContactPointLaw>(&*law)) {
+  } else if (auto* contact = std::get_if<VirtualContactPointLaw>(&law)) {
     read_virtual_contact_point(reader, *contact);
-  } else if (auto* magnetic = std::get_if<MagneticLaw>(&*law)) {
+  } else if (auto* magnetic = std::get_if<MagneticLaw>(&law)) {
     only(reader, {"formulation", "band"}, "by the law \"magnetic\"");
     magnetic->band = reader.quantity("band", Dimension::length, magnetic->band, Range::positive());
-  } else if (auto* cross = std::get_if<CrossUncrossLaw>(&*law)) {
+  } else if (auto* cross = std::get_if<CrossUncrossLaw>(&law)) {
     only(reader, {"formulation", "retarding", "reach"}, "by the law \"cross-uncross\"");
     cross->retarding = reader.quantity("retarding", Dimension::damping, cross->retarding, Range::not_negative());
     if (cross->formulation == Formulation::consistent)
@@ -227,8 +202,8 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
     only(reader, {}, fmt::format("by the law \"{}\"", type));
   }
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate(*law); !valid) return std::move(valid).error().at(place);
-  return ScenePart<Law>{*law, law_json(*law)};
+  ASPERITY_CHECK(at_place(validate(law), place));
+  return ScenePart<Law>{law, law_json(law)};
 }
 
 Result<Stitching> read_stitching(const SceneJson& json, const std::string& place, const SceneContext& context,
@@ -244,7 +219,7 @@ Result<Stitching> read_stitching(const SceneJson& json, const std::string& place
     reader.refuse({"fillet_radius"}, "without \"folds\": \"fillet\"");
   }
   ASPERITY_CHECK(read_blend(reader, context, stitching.blend, stitching.blend_map));
-  if (auto valid = validate(stitching); !valid) return std::move(valid).error().at(place);
+  ASPERITY_CHECK(at_place(validate(stitching), place));
   coat.take("stitching", std::move(reader));
   return stitching;
 }

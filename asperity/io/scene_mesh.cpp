@@ -19,12 +19,6 @@ const std::vector<std::string>& generator_names() {
   return names;
 }
 
-struct Unit {
-  const char* name;
-  double metres;
-};
-constexpr Unit units[] = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}, {"in", 0.0254}};
-
 const std::vector<std::string>& axis_names() {
   static const std::vector<std::string> names{"x", "y", "z", "-x", "-y", "-z"};
   return names;
@@ -53,14 +47,10 @@ class GeneratorReader {
     return reader_.quantity(key, Dimension::length, fallback, Range{1e-9, 1e9});
   }
   void only(std::initializer_list<std::string_view> taken) {
-    for (const SceneObjectKeys& entry : scene_object_keys()) {
-      if (entry.object != "mesh generator") continue;
-      for (const std::string& key : entry.keys) {
-        if (key != "generator" && std::find(taken.begin(), taken.end(), key) == taken.end()) {
-          reader_.refuse({key}, "by this generator");
-        }
-      }
-    }
+    const auto takes = [&](const std::string& key) {
+      return key == "generator" || std::find(taken.begin(), taken.end(), key) != taken.end();
+    };
+    reader_.refuse_unless(takes, "by this generator");
   }
 
   MeshSource icosphere_source() {
@@ -117,7 +107,7 @@ class GeneratorReader {
       angles.clear();
       for (std::size_t i = 0; i < given->size(); ++i) {
         const SceneJson wrapped = SceneJson{{"fold_angles", (*given)[i]}};
-        ObjectReader one(wrapped, fmt::format("{}[{}]", reader_.place_of("fold_angles"), i), "mesh generator");
+        ObjectReader one(wrapped, reader_.place_of("fold_angles", i), "mesh generator");
         angles.push_back(one.quantity("fold_angles", Dimension::angle, 0.0, Range{10.0 * degree, 180.0 * degree}));
         if (!one.error()) continue;
         Error error = *one.error();
@@ -142,20 +132,16 @@ class GeneratorReader {
                    fmt::format("at most {} triangles", most_displaced_triangles), ErrorCode::too_large);
     }
     const SceneJson* relief = reader_.raw("mesostructure");
-    if (relief == nullptr) reader_.fail("mesostructure", "is missing", "an object with the keys of a coat");
+    reader_.require("mesostructure", "an object with the keys of a coat");
     if (reader_.failed()) return {};
-    Result<TriangleMesh> base = TriangleMesh::build(trial_mesh_b(fold, settings));
-    if (!base) {
-      reader_.fail(std::move(base).error().at(reader_.place()));
-      return {};
-    }
-    Result<Coat> coat = heights_of(*relief, *base);
-    if (!coat) {
-      reader_.fail(std::move(coat).error());
-      return {};
-    }
-    return displaced_mesh(*base, subdivisions, [&](std::uint32_t face, const Vec3& barycentric) {
-      return coat->sample(*base, face, barycentric).height;
+    return reader_.value_or(displaced_by(*relief, trial_mesh_b(fold, settings), subdivisions), {});
+  }
+
+  Result<MeshSource> displaced_by(const SceneJson& relief, MeshSource source, int subdivisions) {
+    ASPERITY_TRY(const TriangleMesh base, at_place(TriangleMesh::build(std::move(source)), reader_.place()));
+    ASPERITY_TRY(const Coat coat, heights_of(relief, base));
+    return displaced_mesh(base, subdivisions, [&](std::uint32_t face, const Vec3& barycentric) {
+      return coat.sample(base, face, barycentric).height;
     });
   }
 
@@ -167,11 +153,9 @@ class GeneratorReader {
                      fmt::format("{}.{}", place, key), "no such key here");
     }
     ASPERITY_TRY(ScenePart<CoatSource> source, read_coat(json, place, base, context_));
-    Result<Coat> coat = Coat::build(base, std::move(source.value.parts), source.value.settings);
-    if (!coat) return std::move(coat).error().at(place);
     source.canonical.erase("normals");
     reader_.write("mesostructure", std::move(source.canonical));
-    return coat;
+    return at_place(Coat::build(base, std::move(source.value.parts), source.value.settings), place);
   }
 
   MeshSource cup() {
@@ -229,7 +213,7 @@ class GeneratorReader {
 
 Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface, SceneContext& context) {
   ObjectReader reader(json, surface.place_of("mesh"), "mesh generator");
-  if (!reader.failed() && !reader.has("generator")) reader.fail("generator", "is missing", "a generator's name");
+  reader.require("generator", "a generator's name");
   const std::size_t generator = reader.choice("generator", generator_names(), 0);
   ASPERITY_CHECK(reader.status());
   MeshPart part;
@@ -243,14 +227,8 @@ Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface, SceneCo
 Result<MeshPart> from_file(const std::string& file, ObjectReader& surface, SceneContext& context) {
   const std::filesystem::path path = context.resolve(file);
   if (context.progress) context.progress("reading mesh", 0.0);
-  Result<MeshSource> source = read_mesh(path);
-  if (!source) {
-    Error error = std::move(source).error().in_file(path.string());
-    if (error.place.empty()) error.place = surface.place_of("mesh");
-    return error;
-  }
   MeshPart part;
-  part.source = std::move(*source);
+  ASPERITY_TRY(part.source, in_file(read_mesh(path), path.string(), surface.place_of("mesh")));
   part.name = path.stem().string();
   part.from_file = true;
   surface.write("mesh", path.string());
@@ -276,17 +254,15 @@ const char* unit_of_file(const SceneJson& mesh) {
   return metric ? "its file is in metres" : "its file states no unit";
 }
 
-void note_fit(const MeshPart& part, const char* unit, const Vec3& extent, double scale, const SceneContext& context,
-              std::string& note) {
-  note = fmt::format(
-      "mesh \"{}\": {}; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace "
-      "radius of {} "
-      "(\"units\" or \"fit\" choose otherwise)",
-      part.name, unit, scale, format_length(scale * extent.x()), format_length(scale * extent.y()),
-      format_length(scale * extent.z()), context.device.name);
-}
-
 }  // namespace
+
+void note_fit(const std::string& what, double scale, const Vec3& extent, SceneContext& context) {
+  context.note(
+      fmt::format("{}; scaled by {:.4g} to {} x {} x {}, the largest side being the workspace radius of {} (\"units\" "
+                  "or \"fit\" choose otherwise)",
+                  what, scale, format_length(extent.x()), format_length(extent.y()), format_length(extent.z()),
+                  context.device.name));
+}
 
 // By signs and swaps alone, so that planes stay exactly plane.
 Vec3 turned_up(const Vec3& p, std::size_t axis) {
@@ -306,11 +282,12 @@ std::size_t read_up(ObjectReader& surface, std::size_t fallback) {
 
 double read_units(ObjectReader& surface, bool from_file) {
   static const std::vector<std::string> names{"m", "cm", "mm", "um", "in"};
+  constexpr double metres[] = {1.0, 1e-2, 1e-3, 1e-6, 0.0254};
   if (!from_file) {
     surface.refuse({"units"}, "for a generated mesh or volume, which is in metres");
     return 1.0;
   }
-  return units[surface.choice("units", names, 0)].metres;
+  return metres[surface.choice("units", names, 0)];
 }
 
 double read_fit(ObjectReader& surface, bool by_default, const SceneContext& context) {
@@ -338,14 +315,10 @@ double read_fit(ObjectReader& surface, bool by_default, const SceneContext& cont
 
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   const SceneJson* mesh = surface.raw("mesh");
-  if (mesh == nullptr) {
-    surface.fail("mesh", "is missing", "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator");
-    return *surface.error();
-  }
-  if (!mesh->is_string() && !mesh->is_object()) {
-    surface.fail_type("mesh", *mesh, "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator");
-    return *surface.error();
-  }
+  const char* accepted = "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator";
+  surface.require("mesh", accepted);
+  if (mesh != nullptr && !mesh->is_string() && !mesh->is_object()) surface.fail_type("mesh", *mesh, accepted);
+  ASPERITY_CHECK(surface.status());
   ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface, context)
                                                 : from_file(mesh->get_ref<const std::string&>(), surface, context));
   const bool stated = surface.has("units") || surface.has("fit");
@@ -367,9 +340,8 @@ Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   part.turned = up != 1;
   for (Vec3& p : part.source.positions) p = turned_up((p - centre) * part.scale, up);
   if (fitted && part.from_file && !stated) {
-    std::string note;
-    note_fit(part, unit_of_file(*mesh), unit * bounds.extent(), scale, context, note);
-    context.note(std::move(note));
+    note_fit(fmt::format("mesh \"{}\": {}", part.name, unit_of_file(*mesh)), scale, scale * (unit * bounds.extent()),
+             context);
   }
   for (const std::string& note : part.source.notes) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
   part.source.notes.clear();

@@ -13,19 +13,14 @@ namespace {
 Result<ParametricSettings> read_shape(ObjectReader& surface) {
   const SceneJson& json = *surface.raw("parametric");
   ObjectReader reader(json, surface.place_of("parametric"), "parametric");
-  if (!reader.failed() && !reader.has("shape")) reader.fail("shape", "is missing", "a shape's name");
+  reader.require("shape", "a shape's name");
   ParametricSettings settings;
   settings.shape = reader.choice("shape", ParametricShape::plane);
   ASPERITY_CHECK(reader.status());
   const auto& taken = parametric_parameters(settings.shape);
   const auto takes = [&](const std::string& key) { return std::find(taken.begin(), taken.end(), key) != taken.end(); };
-  for (const SceneObjectKeys& entry : scene_object_keys()) {
-    if (entry.object != "parametric") continue;
-    for (const std::string& key : entry.keys) {
-      if (key != "shape" && !takes(key))
-        reader.refuse({key}, fmt::format("by the shape \"{}\"", parametric_name(settings.shape)));
-    }
-  }
+  reader.refuse_unless([&](const std::string& key) { return key == "shape" || takes(key); },
+                       fmt::format("by the shape \"{}\"", parametric_name(settings.shape)));
   const auto length = [&](const char* key, double& value) {
     if (takes(key)) value = reader.quantity(key, Dimension::length, value, Range::positive());
   };
@@ -41,12 +36,6 @@ Result<ParametricSettings> read_shape(ObjectReader& surface) {
   return settings;
 }
 
-Result<ParametricSurface> build_shape(const ParametricSettings& settings, const std::string& place) {
-  Result<ParametricSurface> surface = ParametricSurface::build(settings);
-  if (!surface) return std::move(surface).error().at(place);
-  return surface;
-}
-
 }  // namespace
 
 Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& context, Instance& instance,
@@ -55,12 +44,11 @@ Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& cont
       {"mesh", "volume", "iso", "implicit", "units", "fit", "search", "coat", "on_overlap", "shell_directions"},
       "beside a parametric surface");
   ASPERITY_CHECK(surface.status());
-  const std::string place = surface.place_of("parametric");
   ASPERITY_TRY(ParametricSettings settings, read_shape(surface));
   instance.name = surface.text("name", parametric_name(settings.shape));
   ASPERITY_CHECK(surface.status());
-  ASPERITY_TRY(ParametricSurface shape, build_shape(settings, place));
-  instance.sides = surface.choice_or_auto<Sides>("sides").value_or(shape.natural_sides());
+  ASPERITY_TRY(ParametricSurface shape, at_place(ParametricSurface::build(settings), surface.place_of("parametric")));
+  instance.sides = surface.choice_or_auto<Sides>("sides");
   TextureHost host;
   host.name = instance.name;
   host.bounds = shape.bounds();
@@ -70,7 +58,7 @@ Status read_parametric(ObjectReader& surface, const Law& law, SceneContext& cont
     settings.features = texture.geometry;
     settings.tile = texture.fine.mapping.settings().tile;
     // The error says "features" itself.
-    ASPERITY_TRY(shape, build_shape(settings, surface.place_of("texture")));
+    ASPERITY_TRY(shape, at_place(ParametricSurface::build(settings), surface.place_of("texture")));
   }
   instance.surface = std::make_shared<const ParametricSurface>(std::move(shape));
   return surface.status();

@@ -12,20 +12,14 @@ namespace {
 
 class StrokeReader {
  public:
-  StrokeReader(const SceneJson& json, const std::string& place, const Box& bounds, const SceneContext& context)
+  StrokeReader(const SceneJson* json, const std::string& place, const Box& bounds, const SceneContext& context)
       : reader_(json, place, "stroke"), bounds_(bounds), context_(context), stroke_(default_stroke(bounds)) {}
 
   Result<ScenePart<StrokeSettings>> read() {
     ASPERITY_CHECK(reader_.status());
     const std::string name = reader_.text("type", to_string(stroke_.type));
     ASPERITY_CHECK(reader_.status());
-    Result<StrokeType> type = find_stroke_type(name);
-    if (!type) {
-      Error error = std::move(type).error();
-      error.place = reader_.place_of("type");
-      return error;
-    }
-    stroke_.type = *type;
+    ASPERITY_TRY(stroke_.type, at_place(find_stroke_type(name), reader_.place()));
     refuse_other_types_keys();
     ASPERITY_CHECK(read_shape());
     if (stroke_.type != StrokeType::recorded) read_motion();
@@ -88,30 +82,22 @@ class StrokeReader {
   void read_points() {
     const SceneJson* points = reader_.raw("points");
     const char* accepted = "two or more points, each [x, y, z]";
-    if (points == nullptr) return reader_.fail("points", "is missing", accepted);
+    if (points == nullptr) return reader_.require("points", accepted);
     if (!points->is_array()) return reader_.fail_type("points", *points, accepted);
     SceneJson canonical = SceneJson::array();
     for (std::size_t i = 0; i < points->size() && !reader_.failed(); ++i) {
       const Vec3 p = point_of((*points)[i], fmt::format("points[{}]", i), Vec3::Zero());
       stroke_.points.push_back(p);
-      canonical.push_back(SceneJson::array({p.x(), p.y(), p.z()}));
+      canonical.push_back({p.x(), p.y(), p.z()});
     }
     reader_.write("points", std::move(canonical));
   }
 
   Status read_recorded() {
-    const std::string file = reader_.text("path", "");
-    if (!reader_.failed() && file.empty())
-      reader_.fail("path", "is missing", "a CSV file with time, x, y, z, or a trace");
+    const std::string file = reader_.required_text("path", "a CSV file with time, x, y, z, or a trace");
     ASPERITY_CHECK(reader_.status());
     const std::string path = context_.resolve(file).string();
-    Result<std::vector<TimedPoint>> recorded = read_recorded_path(path);
-    if (!recorded) {
-      Error error = std::move(recorded).error().in_file(path);
-      if (error.place.empty()) error.place = reader_.place_of("path");
-      return error;
-    }
-    stroke_.recorded = std::move(*recorded);
+    ASPERITY_TRY(stroke_.recorded, in_file(read_recorded_path(path), path, reader_.place_of("path")));
     stroke_.repeats = 1;
     stroke_.back_and_forth = false;
     reader_.write("path", path);
@@ -147,7 +133,7 @@ class StrokeReader {
   Vec3 point(std::string_view key, const Vec3& fallback) {
     const SceneJson* value = reader_.raw(key);
     const Vec3 p = value == nullptr ? fallback : point_of(*value, key, fallback);
-    reader_.write(key, SceneJson::array({p.x(), p.y(), p.z()}));
+    reader_.write(key, p);
     return p;
   }
 
@@ -156,35 +142,25 @@ class StrokeReader {
     const char* accepted = "[x, y, z], each a length (m, or with a unit) or a share of the bounds (\"50%\")";
     if (!value.is_array()) {
       reader_.fail_type(key, value, accepted);
-      return fallback;
-    }
-    if (value.size() != 3) {
+    } else if (value.size() != 3) {
       reader_.fail(key, fmt::format("has {} coordinates", value.size()), accepted);
-      return fallback;
     }
     Vec3 p = fallback;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const int axis = static_cast<int>(i);
-      const std::string place = fmt::format("{}[{}]", key, i);
-      const SceneJson& coordinate = value[i];
-      if (coordinate.is_number()) {
-        p[axis] = coordinate.get<double>();
-        continue;
-      }
-      if (!coordinate.is_string()) {
-        reader_.fail_type(place, coordinate, "a length (m, or with a unit) or a share of the bounds (\"50%\")");
-        return fallback;
-      }
-      const auto& text = coordinate.get_ref<const std::string&>();
-      const bool share = text.find('%') != std::string::npos;
-      Result<double> number = parse_quantity(text, share ? Dimension::ratio : Dimension::length);
-      if (!number) {
-        reader_.fail(std::move(number).error().at(reader_.place_of(place)));
-        return fallback;
-      }
-      p[axis] = share ? bounds_.lower[axis] + *number * bounds_.extent()[axis] : *number;
-    }
+    for (std::size_t i = 0; i < 3 && !reader_.failed(); ++i)
+      p[static_cast<int>(i)] = coordinate(value[i], fmt::format("{}[{}]", key, i), static_cast<int>(i));
     return p;
+  }
+  double coordinate(const SceneJson& value, const std::string& key, int axis) {
+    if (value.is_number()) return value.get<double>();
+    if (!value.is_string()) {
+      reader_.fail_type(key, value, "a length (m, or with a unit) or a share of the bounds (\"50%\")");
+      return 0.0;
+    }
+    const auto& text = value.get_ref<const std::string&>();
+    const bool share = text.find('%') != std::string::npos;
+    const double number = reader_.value_or(
+        at_place(parse_quantity(text, share ? Dimension::ratio : Dimension::length), reader_.place_of(key)), 0.0);
+    return share ? bounds_.lower[axis] + number * bounds_.extent()[axis] : number;
   }
 
   /// A length, or a share of the bounds' largest extent.
@@ -214,8 +190,7 @@ class StrokeReader {
 
 Result<ScenePart<StrokeSettings>> read_stroke(const SceneJson* json, const std::string& place, const Box& bounds,
                                               const SceneContext& context) {
-  static const SceneJson empty = SceneJson::object();
-  return StrokeReader(json == nullptr ? empty : *json, place, bounds, context).read();
+  return StrokeReader(json, place, bounds, context).read();
 }
 
 }  // namespace asperity

@@ -21,9 +21,8 @@ struct MaterialPart {
   FinePart fine;
 };
 
-Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface, SceneContext& context) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("material"), "material");
+Result<MaterialPart> read_material(ObjectReader& surface, SceneContext& context) {
+  ObjectReader reader(surface.raw("material"), surface.place_of("material"), "material");
   const DeviceProfile& device = context.device;
   MaterialPart part;
   Material& material = part.material;
@@ -39,7 +38,7 @@ Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface,
   // Sliding holds less than sticking: without a number of its own, four fifths of it.
   material.dynamic_friction = reader.number("dynamic_friction", 0.8 * material.static_friction, Range::not_negative());
   ASPERITY_TRY(part.fine, read_friction(reader, context, material));
-  if (auto valid = validate(material); !valid) return std::move(valid).error().at(surface.place_of("material"));
+  ASPERITY_CHECK(at_place(validate(material), reader.place()));
   if (material.stiffness > device.max_stiffness) {
     context.note(
         fmt::format("material: a stiffness of {:g} N/m is more than the {:g} N/m that {} renders without buzzing",
@@ -47,18 +46,6 @@ Result<MaterialPart> read_material(const SceneJson* json, ObjectReader& surface,
   }
   surface.take("material", std::move(reader));
   return part;
-}
-
-Sides read_sides(ObjectReader& surface, const MeshSurface& mesh, SceneContext& context, const std::string& name) {
-  if (const std::optional<Sides> given = surface.choice_or_auto<Sides>("sides")) return *given;
-  const Sides sides = mesh.natural_sides();
-  if (sides == Sides::both) {
-    context.note(
-        fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" "
-                    "chooses otherwise)",
-                    name));
-  }
-  return sides;
 }
 
 /// The relief, with a note on what building it had to change. `place`: of what it is made from.
@@ -69,16 +56,16 @@ Result<Surface> build_relief(MeshSurface base, CoatSource coat, ObjectReader& su
   settings.directions = surface.choice("shell_directions", settings.directions);
   ASPERITY_CHECK(surface.status());
   if (context.progress) context.progress("fitting the relief", 0.0);
-  auto relief = make_relief(std::move(base), std::move(coat.parts), coat.settings, settings);
-  if (!relief) return std::move(relief).error().at(place);
-  if (const std::string advice = (*relief)->report().advice(); !advice.empty())
+  ASPERITY_TRY(auto relief,
+               at_place(make_relief(std::move(base), std::move(coat.parts), coat.settings, settings), place));
+  if (const std::string advice = relief->report().advice(); !advice.empty())
     context.note(fmt::format("coat on \"{}\": {}", name, advice));
-  return Surface(std::move(*relief));
+  return Surface(std::move(relief));
 }
 
-/// Closes a relief as the coat's `closing` says. What the closed one cannot carry over is refused.
-Status close(Instance& instance, const SceneJson& json, const std::string& place, ObjectReader& coat,
-             SceneContext& context) {
+/// Closes a relief as the coat's `closing` says, and answers that in its canonical copy. What the closed one cannot
+/// carry over is refused.
+Result<SceneJson> close(Instance& instance, const SceneJson& json, const std::string& place, SceneContext& context) {
   ObjectReader reader(json, place, "closing");
   ClosingSettings settings;
   settings.radius = reader.quantity("radius", Dimension::length, settings.radius, Range::positive());
@@ -96,15 +83,11 @@ Status close(Instance& instance, const SceneJson& json, const std::string& place
     return refused(ErrorCode::mismatch, fmt::format("is baked into the heights alone, and the coat has {}", lost),
                    place, "a coat of heights, or no closing");
   }
-  Result<ClosedRelief> baked = close_relief(relief, settings, context.progress);
-  if (!baked) return std::move(baked).error().at(place);
-  auto wearing = wear_closed(relief, *baked);
-  if (!wearing) return std::move(wearing).error().at(place);
-  context.note(fmt::format("coat on \"{}\": {}", instance.name, baked->report.summary()));
-  coat.take("closing", std::move(reader));
-  instance.surface = std::move(*wearing);
-  instance.closed_from = std::make_shared<const ClosedFrom>(ClosedFrom{before, std::move(*baked)});
-  return success();
+  ASPERITY_TRY(ClosedRelief baked, at_place(close_relief(relief, settings, context.progress), place));
+  ASPERITY_TRY(instance.surface, at_place(wear_closed(relief, baked), place));
+  context.note(fmt::format("coat on \"{}\": {}", instance.name, baked.report.summary()));
+  instance.closed_from = std::make_shared<const ClosedFrom>(ClosedFrom{before, std::move(baked)});
+  return std::move(reader.canonical());
 }
 
 /// The coat that the materials of a glTF file make. `json` may be nullptr.
@@ -124,9 +107,8 @@ Result<ScenePart<CoatSource>> read_gltf_coat(const SceneJson* json, const std::s
     ASPERITY_TRY(stitching, read_stitching(*given, reader.place_of("stitching"), context, reader));
   }
   ASPERITY_CHECK(reader.status());
-  Result<CoatSource> coat = gltf_coat(path, source, mesh, own, stitching, scale, context);
-  if (!coat) return std::move(coat).error().at(place);
-  return ScenePart<CoatSource>{std::move(*coat), std::move(reader.canonical())};
+  ASPERITY_TRY(CoatSource coat, at_place(gltf_coat(path, source, mesh, own, stitching, scale, context), place));
+  return ScenePart<CoatSource>{std::move(coat), std::move(reader.canonical())};
 }
 
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
@@ -161,7 +143,13 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
     baked = std::move(features.maps);
   }
   MeshSurface base(TriangleIndex::build(std::move(mesh), search));
-  instance.sides = read_sides(reader, base, context, instance.name);
+  instance.sides = reader.choice_or_auto<Sides>("sides");
+  if (!instance.sides && base.natural_sides() == Sides::both) {
+    context.note(
+        fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" "
+                    "chooses otherwise)",
+                    instance.name));
+  }
   if (baked != nullptr) {
     const std::string place = reader.place_of("texture.features");
     CoatSource coat;
@@ -170,14 +158,12 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
     if (!relief) {
       if (relief.error().place != place + ".mapping") return std::move(relief).error();
       // The coat lies by coordinates that were made from the mapping, which is what the scene says.
-      return Error{
-          ErrorCode::mismatch,
-          fmt::format("is \"{}\", seen from which the surface spans no area in the plane of the features",
-                      mapping_name(texture.fine.mapping.settings().surface)),
-          {},
-          reader.place_of("texture.mapping.surface"),
-          "another mapping (\"plane\" for a sheet) or another \"axis\" or \"origin\" of it; \"as\": \"texture\" "
-          "needs no area"};
+      return refused(ErrorCode::mismatch,
+                     fmt::format("is \"{}\", seen from which the surface spans no area in the plane of the features",
+                                 mapping_name(texture.fine.mapping.settings().surface)),
+                     reader.place_of("texture.mapping.surface"),
+                     "another mapping (\"plane\" for a sheet) or another \"axis\" or \"origin\" of it; \"as\": "
+                     "\"texture\" needs no area");
     }
     instance.surface = std::move(*relief);
     return success();
@@ -188,19 +174,15 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
     return reader.status();
   }
   const std::string place = reader.place_of("coat");
-  Result<ScenePart<CoatSource>> coat =
-      gltf ? read_gltf_coat(coat_json, place, file, source, base.mesh(), own, scale, context)
-           : read_coat(*coat_json, place, base.mesh(), context);
-  if (!coat) return std::move(coat).error();
+  ASPERITY_TRY(ScenePart<CoatSource> coat,
+               gltf ? read_gltf_coat(coat_json, place, file, source, base.mesh(), own, scale, context)
+                    : read_coat(*coat_json, place, base.mesh(), context));
   ASPERITY_TRY(instance.surface,
-               build_relief(std::move(base), std::move(coat->value), reader, context, instance.name, place));
+               build_relief(std::move(base), std::move(coat.value), reader, context, instance.name, place));
   if (coat_json != nullptr && coat_json->contains("closing")) {
-    static const SceneJson empty = SceneJson::object();
-    ObjectReader shell(empty, place, "coat");
-    ASPERITY_CHECK(close(instance, (*coat_json)["closing"], place + ".closing", shell, context));
-    coat->canonical["closing"] = shell.canonical()["closing"];
+    ASPERITY_TRY(coat.canonical["closing"], close(instance, (*coat_json)["closing"], place + ".closing", context));
   }
-  reader.write("coat", std::move(coat->canonical));
+  reader.write("coat", std::move(coat.canonical));
   return success();
 }
 
@@ -210,7 +192,7 @@ Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& in
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));
   instance.name = reader.text("name", volume.name);
-  instance.sides = reader.choice_or_auto<Sides>("sides").value_or(Sides::both);
+  instance.sides = reader.choice_or_auto<Sides>("sides");
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(std::shared_ptr<const IsoSurface> surface, read_iso(reader, volume, context));
   instance.surface = std::move(surface);
@@ -228,27 +210,19 @@ Pose upright(const Pose& pose, std::size_t up) {
 
 Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, SceneContext& context) {
   const SceneJson* key = surface.raw("mesh");
-  Result<TriangleMesh> mesh = TriangleMesh::build(std::move(part.source));
-  if (!mesh) {
-    Error error = std::move(mesh).error();
-    if (part.from_file) error = std::move(error).in_file(context.resolve(key->get<std::string>()).string());
-    if (error.place.empty()) error.place = surface.place_of("mesh");
-    return error;
-  }
-  for (const std::string& note : mesh->notes()) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
+  const std::string file = part.from_file ? context.resolve(key->get<std::string>()).string() : std::string();
+  ASPERITY_TRY(TriangleMesh mesh, in_file(TriangleMesh::build(std::move(part.source)), file, surface.place_of("mesh")));
+  for (const std::string& note : mesh.notes()) context.note(fmt::format("mesh \"{}\": {}", part.name, note));
   return mesh;
 }
 
-Result<Pose> read_pose(const SceneJson* json, ObjectReader& surface) {
-  static const SceneJson empty = SceneJson::object();
-  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("pose"), "pose");
+Result<Pose> read_pose(ObjectReader& surface) {
+  ObjectReader reader(surface.raw("pose"), surface.place_of("pose"), "pose");
   Pose pose;
   pose.position = reader.lengths("position", Vec3::Zero());
   if (const SceneJson* q = reader.raw("orientation")) {
     reader.refuse({"axis", "angle"}, "beside orientation");
-    const bool numbers = q->is_array() && q->size() == 4 &&
-                         std::all_of(q->begin(), q->end(), [](const SceneJson& v) { return v.is_number(); });
-    if (!numbers) {
+    if (!are_numbers(*q, 4)) {
       reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
     } else {
       pose.orientation =
@@ -281,7 +255,7 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
     ASPERITY_TRY(law, read_law(*given, reader.place_of("law"), context));
   }
   instance.law = law.value;
-  ASPERITY_TRY(MaterialPart material, read_material(reader.raw("material"), reader, context));
+  ASPERITY_TRY(MaterialPart material, read_material(reader, context));
   instance.material = material.material;
   TexturePart texture;
   if (reader.has("custom")) {
@@ -297,7 +271,7 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   } else {
     ASPERITY_CHECK(read_triangles(reader, instance.law, instance.material, context, instance, texture));
   }
-  ASPERITY_TRY(instance.world_from_object, read_pose(reader.raw("pose"), reader));
+  ASPERITY_TRY(instance.world_from_object, read_pose(reader));
   if (reader.has("parametric") || reader.has("custom"))
     instance.world_from_object = upright(instance.world_from_object, read_up(reader, 2));
   ASPERITY_TRY(instance.motion, read_motion(reader));

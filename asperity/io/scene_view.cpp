@@ -20,9 +20,7 @@ Result<Motion> read_motion(ObjectReader& surface) {
   motion.velocity.angular = reader.vector("angular_velocity", Dimension::angle, Vec3::Zero(), fastest_turn);
   motion.since = Seconds(reader.quantity("since", Dimension::time, 0.0, Range::not_negative()));
   // A scene file is one snapshot for the whole run: without a horizon the motion goes on.
-  const bool ends = reader.has("horizon");
-  const double horizon = reader.quantity("horizon", Dimension::time, 3600.0, Range::not_negative());
-  motion.horizon = Seconds(ends ? horizon : 3600.0);
+  motion.horizon = Seconds(reader.quantity("horizon", Dimension::time, 3600.0, Range::not_negative()));
   ASPERITY_CHECK(reader.status());
   surface.take("motion", std::move(reader));
   return motion;
@@ -53,7 +51,7 @@ Result<View> read_view(ObjectReader& root, const Box& bounds) {
     if (!reader.failed()) view.orientation = Quat(Eigen::AngleAxisd(angle, axis.normalized()));
   }
   ASPERITY_CHECK(reader.status());
-  if (auto valid = validate(view); !valid) return std::move(valid).error().at("view");
+  ASPERITY_CHECK(at_place(validate(view), "view"));
   root.take("view", std::move(reader));
   return view;
 }

@@ -33,14 +33,11 @@ std::optional<T> named(ObjectReader& reader, std::string_view key, Result<T> (*p
     reader.fail_type(key, *value, parse("?").error().accepted);
     return std::nullopt;
   }
-  Result<T> parsed = parse(value->get_ref<const std::string&>());
-  if (!parsed) {
-    Error error = std::move(parsed).error();
-    reader.fail(key, error.what, error.accepted);
-    return std::nullopt;
-  }
+  const Result<T> parsed = parse(value->get_ref<const std::string&>());
   reader.write(key, *value);
-  return *parsed;
+  if (parsed) return *parsed;
+  reader.fail(key, parsed.error().what, parsed.error().accepted);
+  return std::nullopt;
 }
 
 VolumeWords read_words(ObjectReader& reader) {
@@ -135,9 +132,7 @@ Result<Samples> generate(ObjectReader& reader, SceneContext& context, std::strin
   GeneratorWords(reader, generator).read();
   ASPERITY_CHECK(reader.status());
   name = to_string(generator.kind);
-  Result<Samples> made = generate_volume(generator, context.progress);
-  if (!made) return std::move(made).error().at(reader.place());
-  return made;
+  return at_place(generate_volume(generator, context.progress), reader.place());
 }
 
 Result<Samples> read_file(ObjectReader& reader, const VolumeWords& words, SceneContext& context,
@@ -154,17 +149,13 @@ Result<Samples> read_file(ObjectReader& reader, const VolumeWords& words, SceneC
     reader.write("time", request.time);
   }
   ASPERITY_CHECK(reader.status());
-  Result<VolumeSource> source = read_volume(path, request, context.progress);
-  if (!source) {
-    Error error = std::move(source).error().in_file(path.string());
-    if (error.place.empty()) error.place = reader.place();
-    return error;
-  }
-  for (const std::string& note : source->notes)
+  ASPERITY_TRY(VolumeSource source,
+               in_file(read_volume(path, request, context.progress), path.string(), reader.place()));
+  for (const std::string& note : source.notes)
     context.note(fmt::format("volume \"{}\": {}", path.stem().string(), note));
-  reader.write("array", source->array);
-  if (source->resample_max == 0.0) reader.write("association", source->cell_data ? "cell" : "node");
-  return std::move(source->data);
+  reader.write("array", source.array);
+  if (source.resample_max == 0.0) reader.write("association", source.cell_data ? "cell" : "node");
+  return std::move(source.data);
 }
 
 /// One number at each sample: a component, or what is derived.
@@ -215,9 +206,8 @@ Result<VolumePart> open_bricks(ObjectReader& object, ObjectReader& reader, const
   settings.resident_bytes = read_bytes(reader, "residency", BrickSettings{}.resident_bytes);
   ASPERITY_CHECK(reader.status());
   ASPERITY_CHECK(object.status());
-  Result<std::unique_ptr<BrickStore>> store = BrickStore::open(path, settings);
-  if (!store) return std::move(store).error().in_file(path.string());
-  return VolumePart{std::make_shared<const ScalarField>(std::move(*store), words.reconstruction), path.stem().string()};
+  ASPERITY_TRY(std::unique_ptr<BrickStore> store, in_file(BrickStore::open(path, settings), path.string()));
+  return VolumePart{std::make_shared<const ScalarField>(std::move(store), words.reconstruction), path.stem().string()};
 }
 
 /// A volume whose samples are in memory: scaled to metres, derived from, then fitted to the workspace.
@@ -240,12 +230,7 @@ Result<VolumePart> in_memory(ObjectReader& object, ObjectReader& reader, const V
   const double factor = fitted ? size / largest : 1.0;
   if (fitted || !from_file) grid = std::move(grid).placed(factor, -factor * bounds.centre());
   if (fitted && from_file && !stated) {
-    const Vec3 extent = factor * bounds.extent();
-    context.note(
-        fmt::format("volume \"{}\": its file states no unit; scaled by {:.4g} to {} x {} x {}, the largest "
-                    "side being the workspace radius of {} (\"units\" or \"fit\" choose otherwise)",
-                    name, factor, format_length(extent.x()), format_length(extent.y()), format_length(extent.z()),
-                    context.device.name));
+    note_fit(fmt::format("volume \"{}\": its file states no unit", name), factor, factor * bounds.extent(), context);
   }
   if (context.progress) context.progress("building the octree", 0.0);
   return VolumePart{std::make_shared<const ScalarField>(std::move(grid), words.reconstruction), std::move(name)};
@@ -259,9 +244,7 @@ Result<VolumePart> read_part(ObjectReader& object, const SceneJson& json, SceneC
     reader.refuse({"size", "extent", "stretch", "radius", "wavelength", "thickness", "amplitude", "gradient", "count",
                    "speed", "strength", "type"},
                   "without a generator");
-    const std::string file = reader.text("file", "");
-    if (!reader.failed() && file.empty()) reader.fail("file", "is missing", "a volume file, or a generator");
-    path = context.resolve(file);
+    path = context.resolve(reader.required_text("file", "a volume file, or a generator"));
     reader.write("file", path.string());
   }
   ASPERITY_CHECK(reader.status());
@@ -322,17 +305,14 @@ std::size_t read_bytes(ObjectReader& reader, std::string_view key, std::size_t f
     const auto found = std::find_if(units.begin(), units.end(), [&](const auto& entry) { return entry.first == unit; });
     if (!number || found == units.end()) {
       reader.fail(key, fmt::format("\"{}\" is no size", text), accepted);
-      return fallback;
+    } else {
+      bytes = *number * found->second;
     }
-    bytes = *number * found->second;
   } else if (value != nullptr) {
     reader.fail_type(key, *value, accepted);
-    return fallback;
   }
-  if (!(bytes >= least && bytes <= most)) {
-    reader.fail(key, fmt::format("is {:g} bytes", bytes), accepted);
-    return fallback;
-  }
+  if (!(bytes >= least && bytes <= most)) reader.fail(key, fmt::format("is {:g} bytes", bytes), accepted);
+  if (reader.failed()) return fallback;
   const auto resident = static_cast<std::size_t>(bytes);
   reader.write(key, resident);
   return resident;
@@ -341,7 +321,7 @@ std::size_t read_bytes(ObjectReader& reader, std::string_view key, std::size_t f
 Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context) {
   const SceneJson* volume = object.raw("volume");
   const char* accepted = "a volume file or an object with \"file\" or \"generator\"";
-  if (volume == nullptr) object.fail("volume", "is missing", accepted);
+  object.require("volume", accepted);
   if (volume != nullptr && !volume->is_string() && !volume->is_object()) object.fail_type("volume", *volume, accepted);
   ASPERITY_CHECK(object.status());
   std::string key;
@@ -363,9 +343,7 @@ Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context)
 
 Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const VolumePart& volume,
                                                    SceneContext& context) {
-  static const SceneJson empty = SceneJson::object();
-  const SceneJson* json = surface.raw("iso");
-  ObjectReader reader(json == nullptr ? empty : *json, surface.place_of("iso"), "iso");
+  ObjectReader reader(surface.raw("iso"), surface.place_of("iso"), "iso");
   reader.write("threshold", nullptr);  // first in its canonical copy, however it is found
   const std::optional<double> given = read_threshold(reader, *volume.field);
   const auto inside = reader.choice("inside", Inside::high);
@@ -375,9 +353,8 @@ Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const 
   reader.write("threshold", threshold);
   Result<IsoSurface> iso = IsoSurface::build(volume.field, threshold, inside, speed);
   if (!iso) {
-    Error error = std::move(iso).error();
-    error.place = reader.place_of("threshold");
-    return error;
+    iso.error().place = reader.place_of("threshold");
+    return std::move(iso).error();
   }
   surface.take("iso", std::move(reader));
   return std::make_shared<const IsoSurface>(std::move(*iso));

@@ -21,7 +21,7 @@ TEST_F(ExperimentScene, AMeshAloneIsAScene) {
   EXPECT_EQ(e.scene.instances()[0].name, "sphere");
   EXPECT_EQ(e.device.name, "phantom-desktop");
   EXPECT_EQ(law_name(e.scene.instances()[0].law), "proxy");
-  EXPECT_EQ(e.scene.instances()[0].sides, Sides::front);
+  EXPECT_EQ(e.scene.facts(0).sides, Sides::front);
   EXPECT_EQ(e.scene.instances()[0].material.stiffness, 1000.0);
   // 6 units across become the workspace radius of 0.1 m, around the origin, and a note says so.
   const Box& bounds = base_mesh(e.scene.instances()[0].surface).bounds();

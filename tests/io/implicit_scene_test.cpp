@@ -37,7 +37,7 @@ TEST_F(ImplicitScene, AMeshIsFeltThroughItsPotential) {
   EXPECT_NEAR(surface.grid().voxel(), 0.001, 1e-12);
   EXPECT_TRUE(surface.grid().has_faces());
   ASSERT_NE(surface.mesh(), nullptr);
-  EXPECT_EQ(e.scene.instances()[0].sides, Sides::front);
+  EXPECT_EQ(e.scene.facts(0).sides, Sides::front);
   SurfaceCache cache;
   EXPECT_NEAR(surface.eval(Vec3(0.0, 0.021, 0.004), cache).value, 0.001, 1e-7);
   EXPECT_NEAR(surface.eval(Vec3(0.0, 0.018, 0.004), cache).value, -0.002, 1e-7);

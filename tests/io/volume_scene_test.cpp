@@ -65,7 +65,7 @@ TEST_F(VolumeScene, AVolumeIsFittedToTheWorkspaceAndSaysSo) {
   EXPECT_TRUE(has_note(e, "its file states no unit"));
   EXPECT_TRUE(has_note(e, "no threshold given"));
   EXPECT_EQ(surface.inside(), Inside::high);
-  EXPECT_EQ(e.scene.instances()[0].sides, Sides::both);
+  EXPECT_EQ(e.scene.facts(0).sides, Sides::both);
   EXPECT_EQ(e.scene.instances()[0].name, "ball");
   EXPECT_DOUBLE_EQ(surface.threshold(), otsu_threshold(*surface.field().grid()));
 }

@@ -53,12 +53,10 @@ Status read_custom(ObjectReader& surface, Instance& instance) {
   const SceneJson& json = *surface.raw("custom");
   if (!json.is_object())
     return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, "an object with a \"type\"");
-  if (!json.contains("type") || !json["type"].is_string()) {
-    return Error{json.contains("type") ? ErrorCode::bad_type : ErrorCode::bad_value,
-                 json.contains("type") ? fmt::format("is {}", json_type(json["type"])) : std::string("is missing"),
-                 {},
-                 place + ".type",
-                 "the name of a surface that the program has registered"};
+  const char* accepted = "the name of a surface that the program has registered";
+  if (!json.contains("type")) return bad_value("is missing", place + ".type", accepted);
+  if (!json["type"].is_string()) {
+    return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json["type"])), place + ".type", accepted);
   }
   surface.refuse({"mesh", "parametric", "volume", "iso", "implicit", "units", "fit", "search", "coat", "on_overlap",
                   "shell_directions"},
@@ -66,12 +64,11 @@ Status read_custom(ObjectReader& surface, Instance& instance) {
   ASPERITY_CHECK(surface.status());
   const std::string type = json["type"].get<std::string>();
   ASPERITY_TRY(NamedNumbers numbers, read_named_numbers(json, place));
-  Result<CustomSurface> made = make_custom_surface(type, numbers);
-  if (!made) return std::move(made).error().at(place);
+  ASPERITY_TRY(CustomSurface made, at_place(make_custom_surface(type, numbers), place));
   surface.write("custom", named_numbers_json(type, numbers));
   instance.name = surface.text("name", type);
-  instance.sides = surface.choice_or_auto<Sides>("sides").value_or(made->natural_sides());
-  instance.surface = std::make_shared<const CustomSurface>(std::move(*made));
+  instance.sides = surface.choice_or_auto<Sides>("sides");
+  instance.surface = std::make_shared<const CustomSurface>(std::move(made));
   return surface.status();
 }
 

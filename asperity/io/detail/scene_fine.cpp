@@ -34,7 +34,7 @@ Vec2 widest(const ParametricSurface& surface) {
 class MappingReader {
  public:
   MappingReader(const SceneJson* json, const std::string& place, const TextureHost& host)
-      : reader_(json == nullptr ? empty() : *json, place, "feature mapping"), host_(host) {}
+      : reader_(json, place, "feature mapping"), host_(host) {}
 
   Result<ScenePart<FeatureMapping>> read() {
     const bool parametric = host_.parametric != nullptr;
@@ -47,17 +47,11 @@ class MappingReader {
       read_frame();
     }
     ASPERITY_CHECK(reader_.status());
-    Result<FeatureMapping> mapping = FeatureMapping::build(settings_);
-    if (!mapping) return std::move(mapping).error().at(reader_.place());
-    return ScenePart<FeatureMapping>{std::move(*mapping), std::move(reader_.canonical())};
+    ASPERITY_TRY(FeatureMapping mapping, at_place(FeatureMapping::build(settings_), reader_.place()));
+    return ScenePart<FeatureMapping>{std::move(mapping), std::move(reader_.canonical())};
   }
 
  private:
-  static const SceneJson& empty() {
-    static const SceneJson object = SceneJson::object();
-    return object;
-  }
-
   void refuse_others() {
     const auto only_for = [&](bool mine, std::initializer_list<std::string_view> keys) {
       if (!mine) reader_.refuse(keys, fmt::format("by the mapping \"{}\"", to_string(settings_.surface)));
@@ -136,7 +130,7 @@ class FeatureReader {
       : reader_(json, place, "feature"), around_(around), context_(context) {}
 
   Result<SurfaceFeature> read() {
-    if (!reader_.failed() && !reader_.has("type")) reader_.fail("type", "is missing", "a feature's name");
+    reader_.require("type", "a feature's name");
     spec_.kind = reader_.choice("type", FeatureKind::grating);
     ASPERITY_CHECK(reader_.status());
     refuse_others();
@@ -155,17 +149,16 @@ class FeatureReader {
       spec_.period = reader_.pair("period", Dimension::length, Vec2(around_, 0.0), Range::not_negative());
     }
     ASPERITY_CHECK(reader_.status());
-    Result<SurfaceFeature> feature = SurfaceFeature::build(spec_);
-    if (!feature) return placed(std::move(feature).error());
-    return feature;
+    return placed(SurfaceFeature::build(spec_));
   }
 
   [[nodiscard]] ObjectReader& reader() { return reader_; }
-  /// An error of the feature, by the key that a scene writes.
-  [[nodiscard]] Error placed(Error error) const {
-    if (error.place == "kind") error.place = "type";
-    if (error.place == "heights") error.place = "height_map";
-    return std::move(error).at(reader_.place());
+  /// The same, an error of the feature by the key that a scene writes.
+  template <class T>
+  [[nodiscard]] Result<T> placed(Result<T> result) const {
+    if (!result && result.error().place == "kind") result.error().place = "type";
+    if (!result && result.error().place == "heights") result.error().place = "height_map";
+    return at_place(std::move(result), reader_.place());
   }
 
  private:
@@ -177,22 +170,17 @@ class FeatureReader {
   void refuse_others() {
     static const std::vector<std::string> of_maps{"height_map", "channel",  "height", "height_range",
                                                   "offset",     "white_is", "filter"};
-    for (const SceneObjectKeys& entry : scene_object_keys()) {
-      if (entry.object != "feature") continue;
-      for (const std::string& key : entry.keys) {
-        const bool of_map = std::find(of_maps.begin(), of_maps.end(), key) != of_maps.end();
-        const bool mine = key == "type" || key == "as" || (of_map && takes("heights")) ||
-                          (key == "count" && takes("wavelength")) ||
-                          (key == "average_roughness" && takes("roughness")) || takes(key);
-        if (!mine) reader_.refuse({key}, fmt::format("by the feature \"{}\"", feature_name(spec_.kind)));
-      }
-    }
+    const auto mine = [&](const std::string& key) {
+      const bool of_map = std::find(of_maps.begin(), of_maps.end(), key) != of_maps.end();
+      return key == "type" || key == "as" || (of_map && takes("heights")) || (key == "count" && takes("wavelength")) ||
+             (key == "average_roughness" && takes("roughness")) || takes(key);
+    };
+    reader_.refuse_unless(mine, fmt::format("by the feature \"{}\"", feature_name(spec_.kind)));
     if (around_ <= 0.0) reader_.refuse({"count"}, "by a mapping that does not go around (\"wavelength\" is)");
   }
 
   double required(const char* key) {
-    if (!reader_.has(key))
-      reader_.fail(key, "is missing", fmt::format("a length above 0 ({})", accepted_units(Dimension::length)));
+    reader_.require(key, fmt::format("a length above 0 ({})", accepted_units(Dimension::length)));
     return reader_.quantity(key, Dimension::length, 0.0, Range::positive());
   }
 
@@ -231,7 +219,7 @@ class FeatureReader {
       spec_.wavelength = reader_.pair("wavelength", Dimension::length, Vec2::Zero(), Range::positive());
     }
     if (two) {
-      reader_.write("wavelength", SceneJson::array({spec_.wavelength.x(), spec_.wavelength.y()}));
+      reader_.write("wavelength", spec_.wavelength);
     } else {
       reader_.write("wavelength", spec_.wavelength.x());
     }
@@ -244,10 +232,7 @@ class FeatureReader {
     const auto filter = reader_.choice("filter", Reconstruction::quadratic_bspline);
     ASPERITY_CHECK(reader_.status());
     ASPERITY_TRY(HeightMap heights, source.build(Wrap::repeat, filter));
-    if (source.sidecar()) {
-      sidecar_size_ =
-          Vec2(source.sidecar()->pixel.x() * heights.width(), source.sidecar()->pixel.y() * heights.height());
-    }
+    if (source.sidecar()) sidecar_size_ = source.tile();
     spec_.heights = std::make_shared<const HeightMap>(std::move(heights));
     return success();
   }
@@ -325,7 +310,7 @@ class TextureReader {
     SceneJson canonical = SceneJson::array();
     for (std::size_t i = 0; i < features->size(); ++i) {
       SceneJson one;
-      ASPERITY_CHECK(read_feature((*features)[i], fmt::format("{}[{}]", reader_.place_of("features"), i), one));
+      ASPERITY_CHECK(read_feature((*features)[i], reader_.place_of("features", i), one));
       canonical.push_back(std::move(one));
     }
     reader_.write("features", std::move(canonical));
@@ -368,8 +353,8 @@ class TextureReader {
     ASPERITY_TRY(SurfaceFeature feature, one.read());
     const std::optional<FeatureScale> as = one.reader().choice_or_auto<FeatureScale>("as", as_);
     ASPERITY_CHECK(one.reader().status());
-    if (auto fits = part_.fine.mapping.check(feature); !fits) return one.placed(std::move(fits).error());
-    if (auto fits = check_closed(feature); !fits) return one.placed(std::move(fits).error());
+    ASPERITY_CHECK(one.placed(part_.fine.mapping.check(feature)));
+    ASPERITY_CHECK(one.placed(check_closed(feature)));
     canonical = std::move(one.reader().canonical());
     const FeatureScale own = scale_of(feature.wavelength(), scales_);
     const FeatureScale scale = as.value_or(own);
@@ -472,9 +457,8 @@ Status attach_fine(const ObjectReader& surface, TexturePart texture, const FineP
   fine.lay = material.lay;
   fine.friction_map = material.friction_map;
   fine.resolution = context.device.position_resolution;
-  Result<FineFeatures> built = FineFeatures::build(std::move(fine));
-  if (!built) return std::move(built).error().at(surface.place_of("texture"));
-  instance.fine = std::make_shared<const FineFeatures>(std::move(*built));
+  ASPERITY_TRY(FineFeatures built, at_place(FineFeatures::build(std::move(fine)), surface.place_of("texture")));
+  instance.fine = std::make_shared<const FineFeatures>(std::move(built));
   return success();
 }
 

@@ -24,7 +24,8 @@ class HeightGeneratorReader {
   MesostructureSpec read() {
     spec_.kind = read_kind();
     spec_.size = reader_.integer("size", 512, 2, 8192);
-    refuse_others();
+    reader_.refuse_unless([&](const auto& key) { return key == "generator" || key == "size" || takes(key); },
+                          "by this generator");
     spec_ = completed(spec_);
     if (takes("count")) spec_.count = reader_.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
     if (takes("number")) read_number();
@@ -44,25 +45,13 @@ class HeightGeneratorReader {
  private:
   MesostructureKind read_kind() {
     const std::string name = reader_.text("generator", "");
-    if (reader_.failed()) return MesostructureKind::flat;
-    Result<MesostructureKind> parsed = parse_mesostructure_kind(name);
-    if (parsed) return *parsed;
-    reader_.fail(std::move(parsed).error().at(reader_.place_of("generator")));
-    return MesostructureKind::flat;
+    return reader_.value_or(at_place(parse_mesostructure_kind(name), reader_.place_of("generator")),
+                            MesostructureKind::flat);
   }
 
   [[nodiscard]] bool takes(std::string_view parameter) const {
     const auto taken = parameters_of(spec_.kind);
     return std::find(taken.begin(), taken.end(), parameter) != taken.end();
-  }
-
-  void refuse_others() {
-    for (const SceneObjectKeys& entry : scene_object_keys()) {
-      if (entry.object != "height generator") continue;
-      for (const std::string& key : entry.keys) {
-        if (key != "generator" && key != "size" && !takes(key)) reader_.refuse({key}, "by this generator");
-      }
-    }
   }
 
   double share(std::string_view key, double fallback, double most) {
@@ -98,16 +87,13 @@ class HeightGeneratorReader {
       const double radius = reader_.quantity("radius", Dimension::ratio, spec_.radius->high, Range{0.001, 0.25});
       spec_.radius = ShareRange{radius, radius};
     } else {
-      reader_.write("radius", SceneJson::array({spec_.radius->low, spec_.radius->high}));
+      reader_.write("radius", Vec2(spec_.radius->low, spec_.radius->high));
     }
   }
 
   void read_radius_range(const SceneJson& given) {
     const char* accepted = "a share of the tile from 0.001 to 0.25, or two [smallest, largest]";
-    if (given.size() != 2 || !given[0].is_number() || !given[1].is_number()) {
-      reader_.fail("radius", "is no pair of numbers", accepted);
-      return;
-    }
+    if (!are_numbers(given, 2)) return reader_.fail("radius", "is no pair of numbers", accepted);
     spec_.radius = ShareRange{given[0].get<double>(), given[1].get<double>()};
     reader_.write("radius", given);
   }
@@ -119,10 +105,10 @@ class HeightGeneratorReader {
 }  // namespace
 
 Status HeightSourceReader::read_source() {
+  const char* accepted = "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library";
   const SceneJson* map = reader_.raw(key_);
   if (map == nullptr) {
-    reader_.fail(key_, "is missing",
-                 "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
+    reader_.require(key_, accepted);
   } else if (map->is_object()) {
     generated_ = true;
     if (map->contains("library")) {
@@ -134,8 +120,7 @@ Status HeightSourceReader::read_source() {
   } else if (map->is_string()) {
     return read_image_source(map->get_ref<const std::string&>());
   } else {
-    reader_.fail_type(key_, *map,
-                      "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
+    reader_.fail_type(key_, *map, accepted);
   }
   return reader_.status();
 }
@@ -152,9 +137,7 @@ Status HeightSourceReader::read_library(const SceneJson& json) {
   const int size = reader.integer("size", 512, 16, 4096);
   const std::uint64_t seed = reader.seed("seed", 0);
   ASPERITY_CHECK(reader.status());
-  Result<LibraryRelief> relief = library_mesostructure(name, size, seed);
-  if (!relief) return std::move(relief).error().at(reader.place_of("library"));
-  library_ = std::move(*relief);
+  ASPERITY_TRY(library_, at_place(library_mesostructure(name, size, seed), reader.place_of("library")));
   HeightSidecar known;
   known.file = "the library";
   known.width = known.height = size;
@@ -169,13 +152,7 @@ Status HeightSourceReader::read_library(const SceneJson& json) {
 Status HeightSourceReader::read_floats() {
   const std::string channel = reader_.text("channel", "automatic");
   ASPERITY_CHECK(reader_.status());
-  Result<FloatImage> image = read_float_image(path_, channel);
-  if (!image) {
-    Error error = std::move(image).error().in_file(path_.string());
-    if (error.place.empty()) error.place = reader_.place_of("channel");
-    return error;
-  }
-  floats_ = std::move(*image);
+  ASPERITY_TRY(floats_, in_file(read_float_image(path_, channel), path_.string(), reader_.place_of("channel")));
   reader_.write(key_, path_.string());
   return success();
 }
@@ -187,13 +164,7 @@ Status HeightSourceReader::read_image_source(const std::string& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".exr") return read_floats();
-  Result<Image> image = read_image(path_);
-  if (!image) {
-    Error error = std::move(image).error().in_file(path_.string());
-    if (error.place.empty()) error.place = reader_.place_of(key_);
-    return error;
-  }
-  image_ = std::move(*image);
+  ASPERITY_TRY(image_, in_file(read_image(path_), path_.string(), reader_.place_of(key_)));
   reader_.write(key_, path_.string());
   channel_ = reader_.choice("channel", Channel::automatic);
   return read_sidecar();
@@ -221,12 +192,10 @@ Status HeightSourceReader::read_sidecar() {
   const SceneJson pixel = json->contains("pixel_size_m") ? (*json)["pixel_size_m"] : SceneJson();
   if (pixel.is_array() && pixel.size() == 2) sidecar.pixel = Vec2(number(pixel[0]), number(pixel[1]));
   if (!sizes || !(sidecar.high >= sidecar.low) || !(sidecar.pixel.minCoeff() > 0.0) || !sidecar.pixel.allFinite()) {
-    return Error{
+    return refused_file(
         ErrorCode::mismatch,
         fmt::format("does not describe the image beside it, which has {} x {} pixels", image_.width, image_.height),
-        path.string(),
-        {},
-        "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image"};
+        path.string(), "width, height, pixel_size_m [x, y], height_min_m, height_max_m of that image");
   }
   sidecar_ = sidecar;
   return success();
@@ -243,7 +212,7 @@ std::string HeightSourceReader::accepted_height(const Range& range) const {
 Result<double> HeightSourceReader::height_of(const SceneJson& value, const std::string& place,
                                              const Range& range) const {
   const auto wrong = [&](ErrorCode code, std::string what) {
-    return Error{code, std::move(what), {}, place, accepted_height(range)};
+    return refused(code, std::move(what), place, accepted_height(range));
   };
   double height = 0.0;
   if (value.is_string()) {
@@ -265,15 +234,8 @@ Result<double> HeightSourceReader::height_of(const SceneJson& value, const std::
 
 double HeightSourceReader::read_height(const char* key, double fallback, const Range& range) {
   const SceneJson* value = reader_.raw(key);
-  double height = fallback;
-  if (value != nullptr) {
-    Result<double> read = height_of(*value, reader_.place_of(key), range);
-    if (!read) {
-      reader_.fail(std::move(read).error());
-      return fallback;
-    }
-    height = *read;
-  }
+  const double height =
+      value == nullptr ? fallback : reader_.value_or(height_of(*value, reader_.place_of(key), range), fallback);
   reader_.write(key, height);
   return height;
 }
@@ -324,22 +286,14 @@ Status HeightSourceReader::read_scale(double magnify) {
 }
 
 void HeightSourceReader::read_range(const SceneJson& range) {
-  if (!range.is_array() || range.size() != 2) {
-    reader_.fail_type("height_range", range, "two lengths [lowest, highest]");
-    return;
-  }
+  const char* accepted = "two lengths [lowest, highest]";
+  if (!range.is_array() || range.size() != 2) return reader_.fail_type("height_range", range, accepted);
   double ends[2] = {0.0, 0.0};
-  for (std::size_t i = 0; i < 2; ++i) {
-    Result<double> end = height_of(range[i], fmt::format("{}[{}]", reader_.place_of("height_range"), i), Range{});
-    if (!end) {
-      reader_.fail(std::move(end).error());
-      return;
-    }
-    ends[i] = *end;
-  }
-  if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", "two lengths [lowest, highest]");
+  for (std::size_t i = 0; i < 2; ++i)
+    ends[i] = reader_.value_or(height_of(range[i], reader_.place_of("height_range", i), Range{}), 0.0);
+  if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", accepted);
   scale_ = {ends[1] - ends[0], white_is_deep_ ? ends[1] : ends[0]};
-  reader_.write("height_range", SceneJson::array({ends[0], ends[1]}));
+  reader_.write("height_range", Vec2(ends[0], ends[1]));
 }
 
 Result<HeightMap> HeightSourceReader::build(Wrap wrap, Reconstruction reconstruction) const {
@@ -385,21 +339,17 @@ Result<HeightMap> HeightSourceReader::generated_heights(double amplitude, double
     const double scale = library_.amplitude > 0.0 ? amplitude / library_.amplitude : 0.0;
     std::vector<float> heights = library_.heights;
     for (float& height : heights) height = static_cast<float>(scale * static_cast<double>(height) + offset);
-    Result<HeightMap> map = HeightMap::build(std::move(heights), library_.size, library_.size, wrap, reconstruction);
-    if (!map) return std::move(map).error().at(reader_.place());
-    return map;
+    return at_place(HeightMap::build(std::move(heights), library_.size, library_.size, wrap, reconstruction),
+                    reader_.place());
   }
   const bool flipped = amplitude < 0.0 && spec.kind != MesostructureKind::flat;
   spec.amplitude = flipped ? -amplitude : amplitude;
-  Result<std::vector<float>> heights = generate_heights(spec);
-  if (!heights) return std::move(heights).error().at(reader_.place_of(key_));
+  ASPERITY_TRY(std::vector<float> heights, at_place(generate_heights(spec), reader_.place_of(key_)));
   if (flipped || offset != 0.0) {
     const double sign = flipped ? -1.0 : 1.0;
-    for (float& height : *heights) height = static_cast<float>(sign * static_cast<double>(height) + offset);
+    for (float& height : heights) height = static_cast<float>(sign * static_cast<double>(height) + offset);
   }
-  Result<HeightMap> map = HeightMap::build(std::move(*heights), spec.size, spec.size, wrap, reconstruction);
-  if (!map) return std::move(map).error().at(reader_.place());
-  return map;
+  return at_place(HeightMap::build(std::move(heights), spec.size, spec.size, wrap, reconstruction), reader_.place());
 }
 
 }  // namespace asperity

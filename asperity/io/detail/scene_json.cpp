@@ -57,22 +57,28 @@ std::string short_message(std::string message) {
   return message;
 }
 
+const SceneJson& empty_object() {
+  static const SceneJson empty = SceneJson::object();
+  return empty;
+}
+
 const std::vector<std::string>& keys_of(std::string_view object) {
   static const std::vector<std::string> none;
-  for (const SceneObjectKeys& entry : scene_object_keys()) {
-    if (entry.object == object) return entry.keys;
-  }
-  return none;
+  const auto& objects = scene_object_keys();
+  const auto found =
+      std::find_if(objects.begin(), objects.end(), [&](const auto& one) { return one.object == object; });
+  return found == objects.end() ? none : found->keys;
 }
 
 }  // namespace
 
 Result<SceneJson> parse_scene_json(std::string_view text, const std::string& name) {
   if (text.size() > largest_scene_file) {
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", text.size()), name, {}, "a scene of at most 16 MiB"};
+    return refused_file(ErrorCode::too_large, fmt::format("has {} bytes", text.size()), name,
+                        "a scene of at most 16 MiB");
   }
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
-    return Error{ErrorCode::file_empty, "is empty", name, {}, "a scene in JSON"};
+    return refused_file(ErrorCode::file_empty, "is empty", name, "a scene in JSON");
   }
   DuplicateKeys duplicates;
   try {
@@ -106,6 +112,11 @@ const char* json_type(const SceneJson& value) {
   return "no value";
 }
 
+bool are_numbers(const SceneJson& value, std::size_t count) {
+  return value.is_array() && value.size() == count &&
+         std::all_of(value.begin(), value.end(), [](const SceneJson& one) { return one.is_number(); });
+}
+
 std::string Range::text() const {
   if (std::isfinite(low) && std::isfinite(high))
     return fmt::format("{}{:.4g} to {:.4g}", above_low ? "above " : "", low, high);
@@ -117,9 +128,12 @@ std::string Range::text() const {
 ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object)
     : ObjectReader(json, std::move(place), object, keys_of(object)) {}
 
+ObjectReader::ObjectReader(const SceneJson* json, std::string place, std::string_view object)
+    : ObjectReader(json == nullptr ? empty_object() : *json, std::move(place), object) {}
+
 ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object,
                            const std::vector<std::string>& known)
-    : json_(&json), place_(std::move(place)) {
+    : json_(&json), known_(&known), place_(std::move(place)) {
   if (!json.is_object()) {
     error_ = refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place_, "an object");
     return;
@@ -139,6 +153,10 @@ std::string ObjectReader::place_of(std::string_view key) const {
   return place_.empty() ? std::string(key) : fmt::format("{}.{}", place_, key);
 }
 
+std::string ObjectReader::place_of(std::string_view key, std::size_t index) const {
+  return fmt::format("{}[{}]", place_of(key), index);
+}
+
 const SceneJson* ObjectReader::raw(std::string_view key) const {
   if (!json_->is_object()) return nullptr;
   const auto found = json_->find(key);
@@ -155,6 +173,10 @@ void ObjectReader::fail(std::string_view key, std::string what, std::string acce
 
 void ObjectReader::fail_type(std::string_view key, const SceneJson& value, std::string accepted) {
   fail(key, fmt::format("is {}", json_type(value)), std::move(accepted), ErrorCode::bad_type);
+}
+
+void ObjectReader::require(std::string_view key, std::string accepted) {
+  if (!has(key)) fail(key, "is missing", std::move(accepted));
 }
 
 void ObjectReader::refuse(std::initializer_list<std::string_view> keys, const std::string& why) {
@@ -179,15 +201,9 @@ double ObjectReader::value_of(const SceneJson& value, const std::string& place, 
   if (value.is_number()) {
     number = value.get<double>();
   } else if (value.is_string()) {
-    Result<double> parsed = parse_quantity(value.get_ref<const std::string&>(), dimension);
-    if (!parsed) {
-      fail(std::move(parsed).error().at(place));
-      return 0.0;
-    }
-    number = *parsed;
+    number = value_or(at_place(parse_quantity(value.get_ref<const std::string&>(), dimension), place), 0.0);
   } else {
     fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(value)), place, accepted));
-    return 0.0;
   }
   if (!std::isfinite(number) || !range.holds(number)) {
     fail(bad_value(fmt::format("is {:.6g}", number), place, accepted));
@@ -218,19 +234,17 @@ double ObjectReader::number(std::string_view key, double fallback, const Range& 
 
 int ObjectReader::integer(std::string_view key, int fallback, int low, int high) {
   const SceneJson* value = raw(key);
+  const std::string accepted = fmt::format("a whole number, {} to {}", low, high);
   int answer = fallback;
-  if (value != nullptr) {
-    const std::string accepted = fmt::format("a whole number, {} to {}", low, high);
-    if (!value->is_number()) {
-      fail_type(key, *value, accepted);
-      return fallback;
-    }
+  if (value != nullptr && !value->is_number()) {
+    fail_type(key, *value, accepted);
+  } else if (value != nullptr) {
     const double number = value->get<double>();
-    if (!(number >= low && number <= high) || number != std::floor(number)) {
+    if (number >= low && number <= high && number == std::floor(number)) {
+      answer = static_cast<int>(number);
+    } else {
       fail(key, fmt::format("is {}", number), accepted);
-      return fallback;
     }
-    answer = static_cast<int>(number);
   }
   write(key, answer);
   return answer;
@@ -238,141 +252,121 @@ int ObjectReader::integer(std::string_view key, int fallback, int low, int high)
 
 std::uint64_t ObjectReader::seed(std::string_view key, std::uint64_t fallback) {
   const SceneJson* value = raw(key);
-  std::uint64_t answer = fallback;
-  if (value != nullptr) {
-    if (!value->is_number()) {
-      fail_type(key, *value, "a whole number, 0 or more");
-    } else if (!value->is_number_unsigned()) {
-      fail(key, fmt::format("is {}", value->get<double>()), "a whole number, 0 or more");
-    } else {
-      answer = value->get<std::uint64_t>();
-    }
-  }
-  write(key, answer);
-  return answer;
+  const char* accepted = "a whole number, 0 or more";
+  if (value != nullptr && value->is_number() && !value->is_number_unsigned())
+    fail(key, fmt::format("is {}", value->get<double>()), accepted);
+  return plain(key, fallback, &SceneJson::is_number_unsigned, accepted);
 }
 
-bool ObjectReader::boolean(std::string_view key, bool fallback) {
+template <class T>
+T ObjectReader::plain(std::string_view key, T fallback, bool (SceneJson::*is)() const noexcept, const char* accepted) {
   const SceneJson* value = raw(key);
-  bool answer = fallback;
-  if (value != nullptr) {
-    if (value->is_boolean()) {
-      answer = value->get<bool>();
-    } else {
-      fail_type(key, *value, "true or false");
-    }
-  }
-  write(key, answer);
-  return answer;
-}
-
-std::string ObjectReader::text(std::string_view key, std::string fallback) {
-  const SceneJson* value = raw(key);
-  if (value != nullptr) {
-    if (value->is_string()) {
-      fallback = value->get<std::string>();
-    } else {
-      fail_type(key, *value, "a text");
-    }
+  if (value != nullptr && (value->*is)()) {
+    fallback = value->get<T>();
+  } else if (value != nullptr) {
+    fail_type(key, *value, accepted);
   }
   write(key, fallback);
   return fallback;
+}
+
+bool ObjectReader::boolean(std::string_view key, bool fallback) {
+  return plain(key, fallback, &SceneJson::is_boolean, "true or false");
+}
+
+std::string ObjectReader::text(std::string_view key, std::string fallback) {
+  return plain(key, std::move(fallback), &SceneJson::is_string, "a text");
+}
+
+std::string ObjectReader::required_text(std::string_view key, std::string accepted) {
+  std::string given = text(key, "");
+  if (given.empty()) fail(key, "is missing", std::move(accepted));
+  return given;
 }
 
 std::size_t ObjectReader::choice(std::string_view key, std::span<const std::string> names, std::size_t fallback) {
   const std::string list = fmt::format("\"{}\"", fmt::join(names, "\", \""));
   const SceneJson* value = raw(key);
   std::size_t answer = fallback;
-  if (value != nullptr) {
-    if (!value->is_string()) {
-      fail_type(key, *value, list);
-      return fallback;
-    }
+  if (value != nullptr && !value->is_string()) {
+    fail_type(key, *value, list);
+  } else if (value != nullptr) {
     const auto& given = value->get_ref<const std::string&>();
     const auto found = std::find(names.begin(), names.end(), given);
-    if (found == names.end()) {
+    if (found != names.end()) {
+      answer = static_cast<std::size_t>(found - names.begin());
+    } else {
       const std::string near = nearest_name(given, names);
       fail(key,
            fmt::format("\"{}\" is not known{}", given, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
            list);
-      return fallback;
     }
-    answer = static_cast<std::size_t>(found - names.begin());
   }
   write(key, names[answer]);
   return answer;
 }
 
+template <class Vector>
+Vector ObjectReader::values_of(const SceneJson& values, std::string_view key, Dimension dimension, const Range& range) {
+  Vector answer;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    answer[static_cast<int>(i)] = value_of(values[i], place_of(key, i), dimension, range);
+  return answer;
+}
+
 Vec3 ObjectReader::lengths(std::string_view key, const Vec3& fallback) {
+  const char* accepted = "three lengths [x, y, z] (m, or with a unit)";
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;
-  if (value != nullptr) {
-    if (!value->is_array() || value->size() != 3) {
-      if (value->is_array()) {
-        fail(key, fmt::format("has {} numbers", value->size()), "three lengths [x, y, z] (m, or with a unit)");
-      } else {
-        fail_type(key, *value, "three lengths [x, y, z] (m, or with a unit)");
-      }
-      return fallback;
-    }
-    for (std::size_t i = 0; i < 3; ++i) {
-      answer[static_cast<int>(i)] =
-          value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), Dimension::length, {});
-    }
+  if (value != nullptr && !value->is_array()) {
+    fail_type(key, *value, accepted);
+  } else if (value != nullptr && value->size() != 3) {
+    fail(key, fmt::format("has {} numbers", value->size()), accepted);
+  } else if (value != nullptr) {
+    answer = values_of<Vec3>(*value, key, Dimension::length, {});
   }
-  write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
+  write(key, answer);
   return answer;
 }
 
 Vec2 ObjectReader::pair(std::string_view key, Dimension dimension, const Vec2& fallback, const Range& range) {
   const SceneJson* value = raw(key);
   Vec2 answer = fallback;
-  if (value != nullptr && value->is_array()) {
-    if (value->size() != 2) {
-      const char* what = dimension == Dimension::length ? "length" : "number";
-      fail(key, fmt::format("has {} {}s", value->size(), what), fmt::format("one {}, or two [along u, along v]", what));
-      return fallback;
-    }
-    for (std::size_t i = 0; i < 2; ++i)
-      answer[static_cast<int>(i)] = value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), dimension, range);
-  } else if (value != nullptr) {
+  if (value != nullptr && !value->is_array()) {
     answer = Vec2::Constant(value_of(*value, place_of(key), dimension, range));
+  } else if (value != nullptr && value->size() != 2) {
+    const char* what = dimension == Dimension::length ? "length" : "number";
+    fail(key, fmt::format("has {} {}s", value->size(), what), fmt::format("one {}, or two [along u, along v]", what));
+  } else if (value != nullptr) {
+    answer = values_of<Vec2>(*value, key, dimension, range);
   }
-  write(key, SceneJson::array({answer.x(), answer.y()}));
+  write(key, answer);
   return failed() ? fallback : answer;
 }
 
 Vec3 ObjectReader::vector(std::string_view key, Dimension dimension, const Vec3& fallback, double most) {
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;
-  if (value != nullptr) {
-    if (!value->is_array() || value->size() != 3) {
-      fail_type(key, *value, "three quantities [x, y, z]");
-      return fallback;
-    }
-    for (std::size_t i = 0; i < 3; ++i)
-      answer[static_cast<int>(i)] =
-          value_of((*value)[i], fmt::format("{}[{}]", place_of(key), i), dimension, Range{-most, most});
+  if (value != nullptr && (!value->is_array() || value->size() != 3)) {
+    fail_type(key, *value, "three quantities [x, y, z]");
+  } else if (value != nullptr) {
+    answer = values_of<Vec3>(*value, key, dimension, Range{-most, most});
   }
-  write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
+  write(key, answer);
   return failed() ? fallback : answer;
 }
 
 Vec3 ObjectReader::direction(std::string_view key, const Vec3& fallback) {
   const SceneJson* value = raw(key);
   Vec3 answer = fallback;
-  if (value != nullptr) {
-    const bool numbers = value->is_array() && value->size() == 3 && (*value)[0].is_number() &&
-                         (*value)[1].is_number() && (*value)[2].is_number();
-    if (!numbers) {
-      fail_type(key, *value, "three numbers [x, y, z]");
-      return fallback;
-    }
+  if (value != nullptr && !are_numbers(*value, 3)) {
+    fail_type(key, *value, "three numbers [x, y, z]");
+  } else if (value != nullptr) {
     for (std::size_t i = 0; i < 3; ++i) answer[static_cast<int>(i)] = (*value)[i].get<double>();
     if (!answer.allFinite() || answer.norm() < 1e-150)
       fail(key, "has no direction", "three numbers that are not all 0");
   }
-  write(key, SceneJson::array({answer.x(), answer.y(), answer.z()}));
+  write(key, answer);
   return answer;
 }
 

@@ -15,6 +15,7 @@
 #include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/units.h"
+#include "asperity/io/detail/placed.h"
 
 namespace asperity {
 
@@ -26,6 +27,8 @@ Result<SceneJson> parse_scene_json(std::string_view text, const std::string& nam
 
 /// "a string", "an object": a JSON type as messages say it. [any]
 const char* json_type(const SceneJson& value);
+/// Whether it is an array of so many numbers. [any]
+bool are_numbers(const SceneJson& value, std::size_t count);
 
 /// The kinds of object that a scene file may hold, and the keys of each; the published schema describes the same ones.
 /// The keys that the reader knows in one kind of object.
@@ -54,13 +57,17 @@ class ObjectReader {
  public:
   /// `object` names an entry of scene_object_keys(). A `json` that is no object, and an unknown key, are errors.
   ObjectReader(const SceneJson& json, std::string place, std::string_view object);
-  /// The same for an object of another kind of file, with the keys that it may have.
+  /// The same; nullptr: an object without keys.
+  ObjectReader(const SceneJson* json, std::string place, std::string_view object);
+  /// The same for an object of another kind of file, with the keys that it may have, which outlive the reader.
   ObjectReader(const SceneJson& json, std::string place, std::string_view object,
                const std::vector<std::string>& known);
 
   [[nodiscard]] bool has(std::string_view key) const { return json_->is_object() && json_->contains(key); }
   [[nodiscard]] const std::string& place() const { return place_; }
   [[nodiscard]] std::string place_of(std::string_view key) const;
+  /// Of the entry `index` of an array.
+  [[nodiscard]] std::string place_of(std::string_view key, std::size_t index) const;
   [[nodiscard]] bool failed() const { return error_.has_value(); }
 
   /// A number (SI) or a text with a unit.
@@ -72,6 +79,8 @@ class ObjectReader {
   std::uint64_t seed(std::string_view key, std::uint64_t fallback);
   bool boolean(std::string_view key, bool fallback);
   std::string text(std::string_view key, std::string fallback);
+  /// A text that has to be there, and not empty.
+  std::string required_text(std::string_view key, std::string accepted);
   /// One of `names`; answers its position, `fallback` when the key is absent.
   std::size_t choice(std::string_view key, std::span<const std::string> names, std::size_t fallback);
   /// One of an enum's names.
@@ -99,12 +108,32 @@ class ObjectReader {
 
   /// Writes the value that was decided for `key` into the canonical copy.
   void write(std::string_view key, SceneJson value) { canonical_[std::string(key)] = std::move(value); }
+  template <int Size>
+  void write(std::string_view key, const Eigen::Matrix<double, Size, 1>& vector) {
+    write(key, SceneJson(std::vector<double>(vector.begin(), vector.end())));
+  }
   /// Keeps the first error only.
   void fail(std::string_view key, std::string what, std::string accepted, ErrorCode code = ErrorCode::bad_value);
   void fail(Error error);
   void fail_type(std::string_view key, const SceneJson& value, std::string accepted);
+  /// The value; or `fallback`, and the error is kept.
+  template <class T>
+  T value_or(Result<T> result, T fallback) {
+    if (result) return std::move(result).value();
+    fail(std::move(result).error());
+    return fallback;
+  }
+  /// An error where there is no such key.
+  void require(std::string_view key, std::string accepted);
   /// Refuses `keys` where they would be read by nobody; `why` completes "is not read ...".
   void refuse(std::initializer_list<std::string_view> keys, const std::string& why);
+  /// Refuses every key of this kind of object that `takes` does not answer true for.
+  template <class Takes>
+  void refuse_unless(const Takes& takes, const std::string& why) {
+    for (const std::string& key : *known_) {
+      if (!takes(key)) refuse({key}, why);
+    }
+  }
   /// A sub-object that was read: its error, or its canonical copy under `key`.
   void take(std::string_view key, ObjectReader&& child);
 
@@ -118,8 +147,15 @@ class ObjectReader {
     return names;
   }
   double value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range);
+  /// The numbers of an array, written under `key`.
+  template <class Vector>
+  Vector values_of(const SceneJson& values, std::string_view key, Dimension dimension, const Range& range);
+  /// What `key` holds, as it stands where it is of the type that `is` asks for.
+  template <class T>
+  T plain(std::string_view key, T fallback, bool (SceneJson::*is)() const noexcept, const char* accepted);
 
   const SceneJson* json_;
+  const std::vector<std::string>* known_;
   std::string place_;
   std::optional<Error> error_;
   SceneJson canonical_ = SceneJson::object();

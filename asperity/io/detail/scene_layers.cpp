@@ -43,10 +43,9 @@ Result<CoatLayer> read_solid(ObjectReader& reader) {
     spec.seed = reader.seed("seed", spec.seed);
   }
   ASPERITY_CHECK(reader.status());
-  Result<SolidMesostructure> solid = SolidMesostructure::build(spec);
-  if (!solid) return std::move(solid).error().at(reader.place());
+  ASPERITY_TRY(SolidMesostructure solid, at_place(SolidMesostructure::build(spec), reader.place()));
   CoatLayer layer;
-  layer.solid = std::make_shared<const SolidMesostructure>(std::move(*solid));
+  layer.solid = std::make_shared<const SolidMesostructure>(std::move(solid));
   return layer;
 }
 
@@ -60,15 +59,7 @@ Result<CoatLayer> read_map(ObjectReader& reader, const LayerHost& host, SceneCon
   Vec2 tile = host.tile;
   if (host.triplanar) {
     reader.refuse({"repeat"}, "by the triplanar mapping (\"tile\" is the size of one repeat)");
-    const SceneJson* given = reader.raw("tile");
-    if (given != nullptr) {
-      tile = reader.pair("tile", Dimension::length, tile, Range::positive());
-    } else if (source.sidecar()) {
-      tile = source.tile();
-      reader.write("tile", SceneJson::array({tile.x(), tile.y()}));
-    } else {
-      reader.write("tile", SceneJson::array({tile.x(), tile.y()}));
-    }
+    tile = reader.pair("tile", Dimension::length, source.sidecar() ? source.tile() : tile, Range::positive());
   } else {
     reader.refuse({"tile"}, "by this mapping (\"repeat\" says how often the map fits into one of the coat's)");
     const double repeat = reader.number("repeat", 1.0, Range::positive());
@@ -95,7 +86,7 @@ Result<std::shared_ptr<const HeightMap>> read_values(const SceneJson& json, cons
   ASPERITY_CHECK(source.read_source());
   const auto value = [&](const char* key) {
     const Range range = channel == MaterialChannel::stiffness ? Range::positive() : Range::not_negative();
-    if (!reader.has(key)) reader.fail(key, "is missing", "what black (low) and white (high) stand for");
+    reader.require(key, "what black (low) and white (high) stand for");
     switch (channel) {
       case MaterialChannel::stiffness:
       case MaterialChannel::magnetism: return reader.quantity(key, Dimension::stiffness, 1.0, range);
@@ -119,20 +110,18 @@ Result<std::shared_ptr<const HeightMap>> read_values(const SceneJson& json, cons
 Status read_lay_map(const SceneJson& json, const std::string& place, const LayerHost& host, SceneContext& context,
                     MaterialMaps::Parts& parts, SceneJson& canonical) {
   ObjectReader reader(json, place, "lay map");
-  const std::string name = reader.text("image", "");
-  if (!reader.failed() && name.empty())
-    reader.fail("image", "is missing", "an image file whose red and green are the direction, 0.5 none");
+  const std::string name =
+      reader.required_text("image", "an image file whose red and green are the direction, 0.5 none");
   ASPERITY_CHECK(reader.status());
   const std::filesystem::path path = context.resolve(name);
   reader.write("image", path.string());
-  Result<Image> image = read_image(path);
-  if (!image) return std::move(image).error().in_file(path.string());
+  ASPERITY_TRY(const Image image, in_file(read_image(path), path.string()));
   const HeightMapSettings settings{2.0, -1.0, false, host.wrap, Reconstruction::bilinear};
   for (const Channel channel : {Channel::red, Channel::green}) {
-    Result<HeightMap> component = HeightMap::build(*image, channel, settings);
-    if (!component) return std::move(component).error().in_file(path.string()).at(place);
+    ASPERITY_TRY(HeightMap component,
+                 at_place(in_file(HeightMap::build(image, channel, settings), path.string()), place));
     auto& into = channel == Channel::red ? parts.lay_s : parts.lay_t;
-    into = std::make_shared<const HeightMap>(std::move(*component));
+    into = std::make_shared<const HeightMap>(std::move(component));
   }
   canonical = std::move(reader.canonical());
   return success();
@@ -141,9 +130,8 @@ Status read_lay_map(const SceneJson& json, const std::string& place, const Layer
 }  // namespace
 
 Result<Mesostructure> with_detail(Mesostructure maps, const DetailSettings& detail, const std::string& place) {
-  Result<DetailPyramid> pyramid = DetailPyramid::build(maps.heights(), maps.tile(), detail);
-  if (!pyramid) return std::move(pyramid).error().at(place);
-  return maps.with_detail(std::make_shared<const DetailPyramid>(std::move(*pyramid)));
+  ASPERITY_TRY(DetailPyramid pyramid, at_place(DetailPyramid::build(maps.heights(), maps.tile(), detail), place));
+  return maps.with_detail(std::make_shared<const DetailPyramid>(std::move(pyramid)));
 }
 
 Result<std::optional<DetailSettings>> read_detail(ObjectReader& coat) {
@@ -170,7 +158,7 @@ Result<std::vector<CoatLayer>> read_layers(ObjectReader& coat, const LayerHost& 
   }
   SceneJson canonical = SceneJson::array();
   for (std::size_t i = 0; i < json->size(); ++i) {
-    ObjectReader reader((*json)[i], fmt::format("{}[{}]", coat.place_of("layers"), i), "layer");
+    ObjectReader reader((*json)[i], coat.place_of("layers", i), "layer");
     ASPERITY_CHECK(reader.status());
     const bool solid = reader.has("solid");
     if (!solid) {
@@ -179,10 +167,9 @@ Result<std::vector<CoatLayer>> read_layers(ObjectReader& coat, const LayerHost& 
                     fmt::format("by a map (\"solid\" names one of {})", name_list<SolidKind>()));
       ASPERITY_CHECK(reader.status());
     }
-    Result<CoatLayer> layer = solid ? read_solid(reader) : read_map(reader, host, context);
-    if (!layer) return std::move(layer).error();
+    ASPERITY_TRY(CoatLayer layer, solid ? read_solid(reader) : read_map(reader, host, context));
     ASPERITY_CHECK(reader.status());
-    layers.push_back(std::move(*layer));
+    layers.push_back(std::move(layer));
     canonical.push_back(std::move(reader.canonical()));
   }
   coat.write("layers", std::move(canonical));
@@ -210,10 +197,9 @@ Result<std::shared_ptr<const MaterialMaps>> read_material_maps(ObjectReader& coa
     ASPERITY_CHECK(read_lay_map(*lay, reader.place_of("lay"), host, context, parts, canonical));
     reader.write("lay", std::move(canonical));
   }
-  Result<MaterialMaps> maps = MaterialMaps::build(std::move(parts));
-  if (!maps) return std::move(maps).error().at(reader.place());
+  ASPERITY_TRY(MaterialMaps maps, at_place(MaterialMaps::build(std::move(parts)), reader.place()));
   coat.take("maps", std::move(reader));
-  return std::make_shared<const MaterialMaps>(std::move(*maps));
+  return std::make_shared<const MaterialMaps>(std::move(maps));
 }
 
 }  // namespace asperity

@@ -103,8 +103,10 @@ Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, Scen
 double read_units(ObjectReader& object, bool from_file);
 /// The largest extent that `fit` asks for (m); 0: as it is. `by_default`: to the workspace. [build]
 double read_fit(ObjectReader& object, bool by_default, const SceneContext& context);
-/// Reads a `pose`, which may be nullptr, and writes its canonical copy. [build]
-Result<Pose> read_pose(const SceneJson* json, ObjectReader& object);
+/// Says that `what` was scaled to `extent` (m) though nobody asked for it. [build]
+void note_fit(const std::string& what, double scale, const Vec3& extent, SceneContext& context);
+/// Reads `pose` of a surface or an effect and writes its canonical copy. [build]
+Result<Pose> read_pose(ObjectReader& object);
 
 /// Reads `volume`, `units` and `fit` of a surface or an effect. [build]
 Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context);
