@@ -1,12 +1,8 @@
 #include "asperity/device/hand.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <array>
-#include <cmath>
 
-#include "asperity/core/suggest.h"
+#include "asperity/device/detail/checks.h"
 
 namespace asperity {
 namespace {
@@ -21,11 +17,6 @@ const std::array<HandImpedance, 4>& hand_table() {
   return hands;
 }
 
-Status require_of_hand(bool good, const char* field, double value, const char* accepted) {
-  if (good && std::isfinite(value)) return success();
-  return bad_value(fmt::format("is {}", value), field, accepted);
-}
-
 }  // namespace
 
 std::span<const HandImpedance> hand_presets() {
@@ -33,27 +24,18 @@ std::span<const HandImpedance> hand_presets() {
 }
 
 std::vector<std::string> hand_preset_names() {
-  std::vector<std::string> names;
-  for (const HandImpedance& hand : hand_table()) names.push_back(hand.name);
-  return names;
+  return names_in(hand_presets());
 }
 
 Result<HandImpedance> find_hand(std::string_view name) {
-  for (const HandImpedance& hand : hand_table()) {
-    if (edit_distance(name, hand.name) == 0) return hand;
-  }
-  const std::vector<std::string> names = hand_preset_names();
-  const std::string near = nearest_name(name, names);
-  const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return bad_value(fmt::format("hand \"{}\" is not known{}", name, hint), "",
-                   fmt::format("{}", fmt::join(names, ", ")));
+  return find_in(hand_presets(), name, "hand");
 }
 
 Status validate_hand(const HandImpedance& hand) {
-  ASPERITY_CHECK(require_of_hand(hand.mass > 0.0, "mass", hand.mass, "a mass above 0 (kg)"));
-  ASPERITY_CHECK(require_of_hand(hand.damping >= 0.0, "damping", hand.damping, "a damping of 0 or more (N s/m)"));
-  ASPERITY_CHECK(require_of_hand(hand.stiffness > 0.0, "stiffness", hand.stiffness, "a stiffness above 0 (N/m)"));
-  return require_of_hand(hand.lateral_limit > 0.0, "lateral_limit", hand.lateral_limit, "a force above 0 (N)");
+  ASPERITY_CHECK(require(hand.mass > 0.0, "mass", hand.mass, "a mass above 0 (kg)"));
+  ASPERITY_CHECK(require(hand.damping >= 0.0, "damping", hand.damping, "a damping of 0 or more (N s/m)"));
+  ASPERITY_CHECK(require(hand.stiffness > 0.0, "stiffness", hand.stiffness, "a stiffness above 0 (N/m)"));
+  return require(hand.lateral_limit > 0.0, "lateral_limit", hand.lateral_limit, "a force above 0 (N)");
 }
 
 }  // namespace asperity

@@ -1,12 +1,8 @@
 #include "asperity/device/profile.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <array>
-#include <cmath>
 
-#include "asperity/core/suggest.h"
+#include "asperity/device/detail/checks.h"
 
 namespace asperity {
 namespace {
@@ -81,11 +77,6 @@ const std::array<DeviceProfile, profile_count>& profile_table() {
   return profiles;
 }
 
-Status require_of_profile(bool good, const char* field, double value, const char* accepted) {
-  if (good && std::isfinite(value)) return success();
-  return bad_value(fmt::format("is {}", value), field, accepted);
-}
-
 }  // namespace
 
 std::span<const DeviceProfile> device_profiles() {
@@ -93,38 +84,26 @@ std::span<const DeviceProfile> device_profiles() {
 }
 
 std::vector<std::string> device_profile_names() {
-  std::vector<std::string> names;
-  for (const DeviceProfile& profile : profile_table()) names.push_back(profile.name);
-  return names;
+  return names_in(device_profiles());
 }
 
 Result<DeviceProfile> find_profile(std::string_view name) {
-  for (const DeviceProfile& profile : profile_table()) {
-    if (edit_distance(name, profile.name) == 0) return profile;
-  }
-  const std::vector<std::string> names = device_profile_names();
-  const std::string near = nearest_name(name, names);
-  const std::string hint = near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near);
-  return bad_value(fmt::format("device \"{}\" is not known{}", name, hint), "",
-                   fmt::format("{}", fmt::join(names, ", ")));
+  return find_in(device_profiles(), name, "device");
 }
 
 Status validate_profile(const DeviceProfile& profile) {
   const DeviceProfile& p = profile;
-  ASPERITY_CHECK(require_of_profile(p.max_force > 0.0, "max_force", p.max_force, "a force above 0 (N)"));
+  ASPERITY_CHECK(require(p.max_force > 0.0, "max_force", p.max_force, "a force above 0 (N)"));
+  ASPERITY_CHECK(require(p.max_stiffness > 0.0, "max_stiffness", p.max_stiffness, "a stiffness above 0 (N/m)"));
+  ASPERITY_CHECK(require(p.max_damping >= 0.0, "max_damping", p.max_damping, "a damping of 0 or more (N s/m)"));
+  ASPERITY_CHECK(require(p.workspace_radius > 0.0, "workspace_radius", p.workspace_radius, "a length above 0 (m)"));
   ASPERITY_CHECK(
-      require_of_profile(p.max_stiffness > 0.0, "max_stiffness", p.max_stiffness, "a stiffness above 0 (N/m)"));
-  ASPERITY_CHECK(
-      require_of_profile(p.max_damping >= 0.0, "max_damping", p.max_damping, "a damping of 0 or more (N s/m)"));
-  ASPERITY_CHECK(
-      require_of_profile(p.workspace_radius > 0.0, "workspace_radius", p.workspace_radius, "a length above 0 (m)"));
-  ASPERITY_CHECK(require_of_profile(p.position_resolution >= 0.0, "position_resolution", p.position_resolution,
-                                    "a length of 0 or more (m)"));
-  ASPERITY_CHECK(require_of_profile(p.mass >= 0.0, "mass", p.mass, "a mass of 0 or more (kg)"));
-  ASPERITY_CHECK(require_of_profile(p.damping >= 0.0, "damping", p.damping, "a damping of 0 or more (N s/m)"));
-  ASPERITY_CHECK(require_of_profile(p.friction >= 0.0, "friction", p.friction, "a force of 0 or more (N)"));
-  ASPERITY_CHECK(require_of_profile(p.slew_limit > 0.0, "slew_limit", p.slew_limit, "a force rate above 0 (N/s)"));
-  return require_of_profile(p.rate > 0.0 && p.rate <= 1e6, "rate", p.rate, "a rate above 0 and up to 1 MHz (Hz)");
+      require(p.position_resolution >= 0.0, "position_resolution", p.position_resolution, "a length of 0 or more (m)"));
+  ASPERITY_CHECK(require(p.mass >= 0.0, "mass", p.mass, "a mass of 0 or more (kg)"));
+  ASPERITY_CHECK(require(p.damping >= 0.0, "damping", p.damping, "a damping of 0 or more (N s/m)"));
+  ASPERITY_CHECK(require(p.friction >= 0.0, "friction", p.friction, "a force of 0 or more (N)"));
+  ASPERITY_CHECK(require(p.slew_limit > 0.0, "slew_limit", p.slew_limit, "a force rate above 0 (N/s)"));
+  return require(p.rate > 0.0 && p.rate <= 1e6, "rate", p.rate, "a rate above 0 and up to 1 MHz (Hz)");
 }
 
 }  // namespace asperity

@@ -1,13 +1,12 @@
 #include "asperity/device/simulated_device.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "asperity/core/rng.h"
+#include "asperity/device/detail/checks.h"
 
 namespace asperity {
 namespace {
@@ -15,11 +14,6 @@ namespace {
 constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr double tremor_low = 8.0;    // Hz, physiological tremor of the hand
 constexpr double tremor_high = 12.0;  // Hz
-
-Status require_of_simulation(bool good, double value, const char* place, const char* accepted) {
-  if (good && std::isfinite(value)) return success();
-  return bad_value(fmt::format("is {}", value), place, accepted);
-}
 
 Vec3 shortened(const Vec3& v, double limit) noexcept {
   const double norm = v.norm();
@@ -33,12 +27,10 @@ Result<SimulatedDevice> SimulatedDevice::build(StrokePath path, const DeviceProf
   if (auto status = validate_profile(profile); !status) return std::move(status).error().at("device");
   if (auto status = validate_hand(hand); !status) return std::move(status).error().at("hand");
   const SimulatedDeviceSettings& s = settings;
-  ASPERITY_CHECK(
-      require_of_simulation(s.force_bandwidth > 0.0, s.force_bandwidth, "force_bandwidth", "a frequency above 0 (Hz)"));
-  ASPERITY_CHECK(require_of_simulation(s.reach > 0.0, s.reach, "reach", "a length above 0 (m)"));
-  ASPERITY_CHECK(require_of_simulation(s.tremor >= 0.0, s.tremor, "tremor", "a length of 0 or more (m)"));
-  ASPERITY_CHECK(
-      require_of_simulation(s.max_substep >= 1e-7, s.max_substep, "max_substep", "a time of 100 ns or more (s)"));
+  ASPERITY_CHECK(require(s.force_bandwidth > 0.0, "force_bandwidth", s.force_bandwidth, "a frequency above 0 (Hz)"));
+  ASPERITY_CHECK(require(s.reach > 0.0, "reach", s.reach, "a length above 0 (m)"));
+  ASPERITY_CHECK(require(s.tremor >= 0.0, "tremor", s.tremor, "a length of 0 or more (m)"));
+  ASPERITY_CHECK(require(s.max_substep >= 1e-7, "max_substep", s.max_substep, "a time of 100 ns or more (s)"));
   return SimulatedDevice(std::move(path), profile, hand, settings);
 }
 

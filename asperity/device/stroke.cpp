@@ -10,15 +10,12 @@
 #include <utility>
 
 #include "asperity/core/suggest.h"
+#include "asperity/device/detail/checks.h"
 
 namespace asperity {
 namespace {
 
 constexpr std::size_t max_samples = 2'000'000;
-Status require_of_stroke(bool good, double value, const char* place, const char* accepted) {
-  if (good && std::isfinite(value)) return success();
-  return bad_value(fmt::format("is {}", value), place, accepted);
-}
 
 Status require_finite(const Vec3& value, const std::string& place) {
   if (value.allFinite()) return success();
@@ -26,38 +23,33 @@ Status require_finite(const Vec3& value, const std::string& place) {
 }
 
 Status validate_motion(const StrokeSettings& s) {
-  ASPERITY_CHECK(require_of_stroke(s.speed > 0.0, s.speed, "speed", "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(
-      require_of_stroke(s.approach_speed > 0.0, s.approach_speed, "approach_speed", "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(
-      require_of_stroke(s.approach_height >= 0.0, s.approach_height, "approach_height", "a length of 0 or more (m)"));
-  if (s.press == PressMode::force) {
-    ASPERITY_CHECK(require_of_stroke(s.normal_force > 0.0, s.normal_force, "normal_force", "a force above 0 (N)"));
-  } else {
-    ASPERITY_CHECK(require_of_stroke(true, s.depth, "depth", "a finite length (m)"));
-  }
+  ASPERITY_CHECK(require(s.speed > 0.0, "speed", s.speed, "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(require(s.approach_speed > 0.0, "approach_speed", s.approach_speed, "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(require(s.approach_height >= 0.0, "approach_height", s.approach_height, "a length of 0 or more (m)"));
+  ASPERITY_CHECK(s.press == PressMode::force
+                     ? require(s.normal_force > 0.0, "normal_force", s.normal_force, "a force above 0 (N)")
+                     : require(true, "depth", s.depth, "a finite length (m)"));
   if (s.repeats < 1) return bad_value(fmt::format("is {}", s.repeats), "repeats", "1 or more");
   return success();
 }
 
 Status validate_sampling(const StrokeSettings& s) {
   if (s.sample_spacing) {
-    ASPERITY_CHECK(
-        require_of_stroke(*s.sample_spacing > 0.0, *s.sample_spacing, "sample_spacing", "a length above 0 (m)"));
+    ASPERITY_CHECK(require(*s.sample_spacing > 0.0, "sample_spacing", *s.sample_spacing, "a length above 0 (m)"));
   }
   if (s.normal_smoothing) {
-    ASPERITY_CHECK(require_of_stroke(*s.normal_smoothing >= 0.0, *s.normal_smoothing, "normal_smoothing",
-                                     "a length of 0 or more (m)"));
+    ASPERITY_CHECK(
+        require(*s.normal_smoothing >= 0.0, "normal_smoothing", *s.normal_smoothing, "a length of 0 or more (m)"));
   }
   return success();
 }
 
 Status validate_round(const StrokeSettings& s) {
   ASPERITY_CHECK(require_finite(s.centre, "centre"));
-  ASPERITY_CHECK(require_of_stroke(s.radius > 0.0, s.radius, "radius", "a length above 0 (m)"));
+  ASPERITY_CHECK(require(s.radius > 0.0, "radius", s.radius, "a length above 0 (m)"));
   const bool by_pitch = s.type == StrokeType::spiral && s.pitch != 0.0;
-  if (by_pitch) return require_of_stroke(s.pitch > 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use turns");
-  return require_of_stroke(s.turns > 0.0 && s.turns <= 1e4, s.turns, "turns", "a number above 0, up to 10000");
+  if (by_pitch) return require(s.pitch > 0.0, "pitch", s.pitch, "a length above 0 (m), or 0 to use turns");
+  return require(s.turns > 0.0 && s.turns <= 1e4, "turns", s.turns, "a number above 0, up to 10000");
 }
 
 /// Two unit vectors that span the plane across `axis`, the same for the same axis: u lies along +x when it can.
@@ -133,7 +125,7 @@ Result<Guide> raster_guide(const StrokeSettings& s) {
   ASPERITY_CHECK(require_finite(s.start, "start"));
   ASPERITY_CHECK(require_finite(s.end, "end"));
   ASPERITY_TRY(const Plane plane, plane_across(s.axis));
-  ASPERITY_CHECK(require_of_stroke(s.pitch >= 0.0, s.pitch, "pitch", "a length above 0 (m), or 0 to use rows"));
+  ASPERITY_CHECK(require(s.pitch >= 0.0, "pitch", s.pitch, "a length above 0 (m), or 0 to use rows"));
   const Vec3 diagonal = s.end - s.start;
   const double along = diagonal.dot(plane.u);
   const double across = diagonal.dot(plane.v);

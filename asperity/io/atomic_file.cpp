@@ -10,15 +10,14 @@
 #include <string>
 #include <system_error>
 
+#include "asperity/io/detail/file_reading.h"
+
 namespace asperity {
 namespace {
 
 Error unwritable(const std::filesystem::path& path, std::string why) {
-  return {ErrorCode::file_unwritable,
-          "cannot be written: " + std::move(why),
-          path.string(),
-          {},
-          "a path in an existing folder that you may write to"};
+  return refused_file(ErrorCode::file_unwritable, "cannot be written: " + std::move(why), path.string(),
+                      "a path in an existing folder that you may write to");
 }
 
 std::string reason(int error) {

@@ -31,8 +31,9 @@ constexpr std::uint64_t most_chunk_lines = 256;
 /// Coordinates of the data window beyond this leave no room for arithmetic.
 constexpr std::int64_t largest_coordinate = std::int64_t{1} << 30U;
 
-Error exr_error(ErrorCode code, std::string what, const std::string& name, std::string place = "") {
-  return Error{code, std::move(what), name, std::move(place), accepted_exr};
+Error exr_error(ErrorCode code, std::string what, const std::string& name, std::string place = "",
+                std::string accepted = accepted_exr) {
+  return Error{code, std::move(what), name, std::move(place), std::move(accepted)};
 }
 
 struct ExrChannel {
@@ -162,9 +163,8 @@ class HeaderWalk {
   }
 
   [[nodiscard]] Error too_large(std::int64_t width, std::int64_t height) const {
-    Error error = exr_error(ErrorCode::too_large, fmt::format("the image has {} x {} pixels", width, height), name_);
-    error.accepted = fmt::format("at most {} pixels", max_pixels);
-    return error;
+    return exr_error(ErrorCode::too_large, fmt::format("the image has {} x {} pixels", width, height), name_, "",
+                     fmt::format("at most {} pixels", max_pixels));
   }
 
   Result<ExrHeader> finish() {
@@ -231,10 +231,8 @@ std::string names_of(const ExrHeader& header) {
 }
 
 const ExrChannel* find_channel(const ExrHeader& header, std::string_view name) {
-  for (const ExrChannel& channel : header.channels) {
-    if (channel.name == name) return &channel;
-  }
-  return nullptr;
+  const auto found = std::ranges::find(header.channels, name, &ExrChannel::name);
+  return found == header.channels.end() ? nullptr : &*found;
 }
 
 /// Which channels are read: one, or three for their luminance.
@@ -253,10 +251,9 @@ Result<Choice> choose(const ExrHeader& header, const std::string& requested, con
     }
     if (requested == "luminance" && find_channel(header, "Y") != nullptr) return Choice{{"Y"}, "as asked"};
     if (requested == "luminance" && colours) return Choice{{"R", "G", "B"}, "as asked"};
-    Error error = exr_error(ErrorCode::bad_value, fmt::format("the image has no {} channel", requested), name);
-    error.accepted =
-        fmt::format("automatic, or one of its channels: {}{}", names_of(header), colours ? ", luminance" : "");
-    return error;
+    return exr_error(
+        ErrorCode::bad_value, fmt::format("the image has no {} channel", requested), name, "",
+        fmt::format("automatic, or one of its channels: {}{}", names_of(header), colours ? ", luminance" : ""));
   }
   if (header.channels.size() == 1) return Choice{{header.channels.front().name}, "the only channel"};
   for (const char* one : {"Y", "Z", "height", "displacement"}) {
@@ -264,9 +261,8 @@ Result<Choice> choose(const ExrHeader& header, const std::string& requested, con
   }
   if (colours) return Choice{{"R", "G", "B"}, "luminance of red, green and blue"};
   if (find_channel(header, "R") != nullptr) return Choice{{"R"}, "there is no Y"};
-  Error error = exr_error(ErrorCode::bad_map, "has several channels, and none that is known to hold heights", name);
-  error.accepted = fmt::format("the name of a channel: {}", names_of(header));
-  return error;
+  return exr_error(ErrorCode::bad_map, "has several channels, and none that is known to hold heights", name, "",
+                   fmt::format("the name of a channel: {}", names_of(header)));
 }
 
 Result<std::vector<std::vector<float>>> read_channels(std::string_view bytes, const ExrHeader& header,
@@ -344,13 +340,11 @@ Result<FloatImage> read_float_image_bytes(std::string_view bytes, const std::str
     for (std::size_t i = 0; i < image.values.size(); ++i) {
       const float value = image.values[i];
       if (!std::isfinite(value)) {
-        return Error{ErrorCode::bad_map,
-                     fmt::format("has {} in channel {}", std::isnan(value) ? "no number (NaN)" : "an infinite value",
-                                 image.channel),
-                     name,
-                     fmt::format("column {}, row {} (counted from 0, from the upper left)",
-                                 i % static_cast<std::size_t>(image.width), i / static_cast<std::size_t>(image.width)),
-                     "finite values"};
+        const auto width = static_cast<std::size_t>(image.width);
+        const char* what = std::isnan(value) ? "no number (NaN)" : "an infinite value";
+        return exr_error(ErrorCode::bad_map, fmt::format("has {} in channel {}", what, image.channel), name,
+                         fmt::format("column {}, row {} (counted from 0, from the upper left)", i % width, i / width),
+                         "finite values");
       }
       image.lowest = std::min(image.lowest, value);
       image.highest = std::max(image.highest, value);

@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/detail/gltf_looks.h"
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/image_io.h"
@@ -32,9 +33,7 @@ constexpr const char* texture_types[] = {"High_Resolution", "Low_Resolution", "R
 
 /// The member of that name, if `from` is an object that has it.
 const Json* member(const Json& from, const char* key) {
-  if (!from.is_object()) return nullptr;
-  const auto found = from.find(key);
-  return found == from.end() ? nullptr : &*found;
+  return from.is_object() && from.contains(key) ? &from[key] : nullptr;
 }
 
 const Json* member(const Json* from, const char* key) {
@@ -444,9 +443,7 @@ class ImageLoader {
       ASPERITY_TRY(held, document_.resource(text, place + ".uri"));
       bytes = held;
     } else if (view != nullptr && view->is_number_unsigned()) {
-      Result<std::string_view> found = document_.view(view->get<std::size_t>());
-      if (!found) return std::move(found).error();
-      bytes = *found;
+      ASPERITY_TRY(bytes, document_.view(view->get<std::size_t>()));
     } else {
       return malformed("names no data", place, "a uri or a bufferView");
     }
@@ -493,8 +490,7 @@ Result<GltfMaterial> finish(Plan plan, ImageLoader& images, std::vector<std::str
       (entry.property == "stiffness" ? material.stiffness : material.friction)->texture = std::move(texture);
       continue;
     }
-    const std::string note = fmt::format("{} is kept, not felt", entry.info.place);
-    notes.push_back(note);
+    notes.push_back(fmt::format("{} is kept, not felt", entry.info.place));
     material.kept.push_back(
         {entry.property, entry.type, std::move(texture), entry.extras == nullptr ? "" : entry.extras->dump()});
   }
@@ -529,13 +525,11 @@ Result<GltfModel> read_model(std::string_view bytes, const std::filesystem::path
 Result<GltfModel> read_named(std::string_view bytes, const std::string& name, const std::filesystem::path* folder) {
   constexpr const char* accepted = "a glTF 2.0 file (.gltf or .glb)";
   try {
-    if (bytes.empty()) return Error{ErrorCode::file_empty, "is empty", name, {}, accepted};
-    Result<GltfModel> model = read_model(bytes, folder);
-    if (model) return model;
-    return std::move(model).error().in_file(name);
+    if (bytes.empty()) return refused_file(ErrorCode::file_empty, "is empty", name, accepted);
+    return in_file(read_model(bytes, folder), name);
   } catch (const std::exception& problem) {
-    return Error{
-        ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name, {}, accepted};
+    return refused_file(ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name,
+                        accepted);
   }
 }
 
@@ -586,6 +580,16 @@ std::uint16_t normal_code(double component) {
   return static_cast<std::uint16_t>(std::lround(32768.0 + 32767.0 * component));
 }
 
+/// Of 16 bits, without samples yet.
+std::shared_ptr<Image> blank_image(int width, int height, int channels) {
+  auto image = std::make_shared<Image>();
+  image->width = width;
+  image->height = height;
+  image->channels = channels;
+  image->bits = 16;
+  return image;
+}
+
 }  // namespace
 
 Result<Image> normal_image_of(const GltfNormals& normals) {
@@ -614,11 +618,7 @@ Result<Image> normal_image_of(const GltfNormals& normals) {
 }
 
 GltfHeight height_texture_of(const HeightMap& heights) {
-  auto image = std::make_shared<Image>();
-  image->width = heights.width();
-  image->height = heights.height();
-  image->channels = 1;
-  image->bits = 16;
+  const auto image = blank_image(heights.width(), heights.height(), 1);
   std::vector<double> texels;
   for (int y = 0; y < heights.height(); ++y) {
     for (int x = 0; x < heights.width(); ++x) texels.push_back(heights.texel(x, y));
@@ -631,18 +631,12 @@ GltfHeight height_texture_of(const HeightMap& heights) {
     const double share = height.amplitude > 0.0 ? (texel - height.offset) / height.amplitude : 0.0;
     image->samples.push_back(static_cast<std::uint16_t>(std::lround(65535.0 * std::clamp(share, 0.0, 1.0))));
   }
-  height.texture.image = std::move(image);
-  height.texture.source = "heights";
-  height.texture.wrap = heights.wrap();
+  height.texture = {image, "heights", heights.wrap()};
   return height;
 }
 
 GltfNormals normal_texture_of(const NormalMap& normals) {
-  auto image = std::make_shared<Image>();
-  image->width = normals.width();
-  image->height = normals.height();
-  image->channels = 3;
-  image->bits = 16;
+  const auto image = blank_image(normals.width(), normals.height(), 3);
   for (int y = 0; y < normals.height(); ++y) {
     for (int x = 0; x < normals.width(); ++x) {
       const Vec3 normal = normals.texel(x, y);
@@ -650,7 +644,7 @@ GltfNormals normal_texture_of(const NormalMap& normals) {
     }
   }
   GltfNormals texture;
-  texture.texture = {std::move(image), "normals", normals.wrap()};
+  texture.texture = {image, "normals", normals.wrap()};
   return texture;
 }
 

@@ -34,10 +34,6 @@ struct Placement {
   Vec3 offset = Vec3::Zero();
 };
 
-Error error_at(ErrorCode code, std::string what, std::string place, std::string accepted) {
-  return {code, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
 Result<Placement> own_placement(const tinygltf::Node& node, const std::string& place) {
   Placement own;
   if (node.matrix.size() == 16) {
@@ -47,8 +43,8 @@ Result<Placement> own_placement(const tinygltf::Node& node, const std::string& p
     }
     own.offset = {node.matrix[12], node.matrix[13], node.matrix[14]};
     if (node.matrix[3] != 0.0 || node.matrix[7] != 0.0 || node.matrix[11] != 0.0 || node.matrix[15] != 1.0) {
-      return error_at(ErrorCode::file_malformed, "has a projective matrix", place + ".matrix",
-                      "sixteen numbers, column by column, the last row 0 0 0 1");
+      return refused(ErrorCode::file_malformed, "has a projective matrix", place + ".matrix",
+                     "sixteen numbers, column by column, the last row 0 0 0 1");
     }
     return own;
   }
@@ -56,7 +52,7 @@ Result<Placement> own_placement(const tinygltf::Node& node, const std::string& p
     const auto& q = node.rotation;  // x y z w
     const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
     if (!(length > 1e-6 && std::isfinite(length))) {
-      return error_at(ErrorCode::file_malformed, "is no rotation", place + ".rotation", "a unit quaternion x y z w");
+      return refused(ErrorCode::file_malformed, "is no rotation", place + ".rotation", "a unit quaternion x y z w");
     }
     own.linear = Quat(q[3] / length, q[0] / length, q[1] / length, q[2] / length).toRotationMatrix();
   }
@@ -94,13 +90,12 @@ class AccessorReader {
     const std::string place = fmt::format("accessors[{}]", index);
     const std::size_t size = element_size(from.componentType, from.type);
     if (size == 0) {
-      return error_at(ErrorCode::file_malformed, fmt::format("has the component type {}", from.componentType), place,
-                      "5120, 5121, 5122, 5123, 5125 or 5126");
+      return refused(ErrorCode::file_malformed, fmt::format("has the component type {}", from.componentType), place,
+                     "5120, 5121, 5122, 5123, 5125 or 5126");
     }
     if (from.count > most_elements - elements_read_) {
-      return error_at(ErrorCode::too_large,
-                      fmt::format("brings the scene to more than {} elements read", most_elements), place,
-                      "a scene that reads its data less often");
+      return refused(ErrorCode::too_large, fmt::format("brings the scene to more than {} elements read", most_elements),
+                     place, "a scene that reads its data less often");
     }
     elements_read_ += from.count;
     Elements elements;
@@ -112,11 +107,11 @@ class AccessorReader {
         std::memcpy(elements.bytes.data() + i * size, view.data + i * view.stride, size);
       }
     } else if (!from.sparse.isSparse) {
-      return error_at(ErrorCode::bad_mesh, "has no data", place,
-                      "an accessor with a bufferView (compressed geometry is not read)");
+      return refused(ErrorCode::bad_mesh, "has no data", place,
+                     "an accessor with a bufferView (compressed geometry is not read)");
     } else if (from.count > most_zeros) {
-      return error_at(ErrorCode::too_large, fmt::format("has {} elements without data of their own", from.count), place,
-                      fmt::format("up to {}", most_zeros));
+      return refused(ErrorCode::too_large, fmt::format("has {} elements without data of their own", from.count), place,
+                     fmt::format("up to {}", most_zeros));
     } else {
       elements.bytes.resize(from.count * size);
     }
@@ -150,23 +145,23 @@ class AccessorReader {
     const std::string view_place = fmt::format("bufferViews[{}]", index);
     ASPERITY_TRY(const std::string_view buffer, document_.buffer(static_cast<std::size_t>(view.buffer)));
     if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
-      return error_at(ErrorCode::bad_mesh,
-                      fmt::format("reaches from byte {} over {} bytes in a buffer of {}", view.byteOffset,
-                                  view.byteLength, buffer.size()),
-                      view_place, "views that lie within their buffer");
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("reaches from byte {} over {} bytes in a buffer of {}", view.byteOffset,
+                                 view.byteLength, buffer.size()),
+                     view_place, "views that lie within their buffer");
     }
     const std::size_t stride = view.byteStride == 0 ? size : view.byteStride;
     if (stride < size) {
-      return error_at(ErrorCode::file_malformed,
-                      fmt::format("has a stride of {} for elements of {} bytes", stride, size), view_place,
-                      "a stride that holds an element");
+      return refused(ErrorCode::file_malformed,
+                     fmt::format("has a stride of {} for elements of {} bytes", stride, size), view_place,
+                     "a stride that holds an element");
     }
     const std::size_t room = view.byteLength - std::min(offset, view.byteLength);
     if (count > 0 && (room < size || count - 1 > (room - size) / stride)) {
-      return error_at(ErrorCode::bad_mesh,
-                      fmt::format("has {} elements of {} bytes, {} apart, from byte {} of a view of {}", count, size,
-                                  stride, offset, view.byteLength),
-                      place, "accessors that lie within their buffer view");
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("has {} elements of {} bytes, {} apart, from byte {} of a view of {}", count, size,
+                                 stride, offset, view.byteLength),
+                     place, "accessors that lie within their buffer view");
     }
     return View{buffer.data() + view.byteOffset + std::min(offset, view.byteLength), stride};
   }
@@ -180,7 +175,7 @@ class AccessorReader {
                                sparse.indices.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
     const std::size_t index_size = element_size(sparse.indices.componentType, TINYGLTF_TYPE_SCALAR);
     if (!unsigned_type) {
-      return error_at(ErrorCode::file_malformed, "has indices of no unsigned type", at, "5121, 5123 or 5125");
+      return refused(ErrorCode::file_malformed, "has indices of no unsigned type", at, "5121, 5123 or 5125");
     }
     const auto count = static_cast<std::size_t>(sparse.count);
     ASPERITY_TRY(
@@ -192,8 +187,8 @@ class AccessorReader {
       std::uint32_t index = 0;
       std::memcpy(&index, indices.data + i * indices.stride, index_size);
       if (index >= elements.count) {
-        return error_at(ErrorCode::bad_mesh, fmt::format("changes element {} of {}", index, elements.count), at,
-                        "indices of elements that are there");
+        return refused(ErrorCode::bad_mesh, fmt::format("changes element {} of {}", index, elements.count), at,
+                       "indices of elements that are there");
       }
       std::memcpy(elements.bytes.data() + index * size, values.data + i * values.stride, size);
     }
@@ -226,10 +221,10 @@ class SceneGatherer {
       return add_mesh(mesh, placement, place);
     }));
     if (source_.triangles.empty()) {
-      return error_at(ErrorCode::bad_mesh,
-                      fmt::format("has no triangles in its scene ({} meshes, {} parts of points or lines)",
-                                  model_.meshes.size(), pointlike_),
-                      {}, "a scene with at least one triangle");
+      return refused(ErrorCode::bad_mesh,
+                     fmt::format("has no triangles in its scene ({} meshes, {} parts of points or lines)",
+                                 model_.meshes.size(), pointlike_),
+                     {}, "a scene with at least one triangle");
     }
     finish();
     return GltfTriangles{std::move(source_), std::move(look_of_triangle_)};
@@ -276,8 +271,8 @@ class SceneGatherer {
       const auto index = static_cast<std::size_t>(waiting.node);
       const std::string place = fmt::format("nodes[{}]", index);
       if (reached[index]) {
-        return error_at(ErrorCode::file_malformed, "is reached twice: by two parents, or by itself", place,
-                        "nodes that form trees");
+        return refused(ErrorCode::file_malformed, "is reached twice: by two parents, or by itself", place,
+                       "nodes that form trees");
       }
       reached[index] = true;
       const tinygltf::Node& node = model_.nodes[index];
@@ -287,8 +282,8 @@ class SceneGatherer {
       if (node.mesh >= 0) ASPERITY_CHECK(visit(static_cast<std::size_t>(node.mesh), here, place));
       // A chain of children that share one node's list could grow the stack without end before it is found out.
       if (stack.size() + node.children.size() > model_.nodes.size()) {
-        return error_at(ErrorCode::file_malformed, "has more children than there are nodes", place,
-                        "nodes that form trees");
+        return refused(ErrorCode::file_malformed, "has more children than there are nodes", place,
+                       "nodes that form trees");
       }
       for (std::size_t i = node.children.size(); i-- > 0;) stack.push_back({node.children[i], here});
     }
@@ -332,8 +327,8 @@ class SceneGatherer {
     add(total_.parts, amount.parts, most_parts);
     const auto check = [&](std::size_t count, std::size_t most, const char* what) -> Status {
       if (count <= most) return success();
-      return error_at(ErrorCode::too_large, fmt::format("brings the scene to more than {} {}", most, what), place,
-                      "a scene that fits, its instances counted one by one");
+      return refused(ErrorCode::too_large, fmt::format("brings the scene to more than {} {}", most, what), place,
+                     "a scene that fits, its instances counted one by one");
     };
     ASPERITY_CHECK(check(total_.vertices, most_vertices, "vertices"));
     ASPERITY_CHECK(check(total_.triangles, most_triangles, "triangles"));
@@ -386,8 +381,8 @@ class SceneGatherer {
     if (const auto known = first_vertex_.find(index); known != first_vertex_.end()) return known->second;
     const tinygltf::Accessor& accessor = accessors_.accessor(index);
     if (accessor.type != TINYGLTF_TYPE_VEC3 || accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) {
-      return error_at(ErrorCode::file_unsupported, "has positions that are not three floats",
-                      place + ".attributes.POSITION", "VEC3 of 5126 (KHR_mesh_quantization is not read)");
+      return refused(ErrorCode::file_unsupported, "has positions that are not three floats",
+                     place + ".attributes.POSITION", "VEC3 of 5126 (KHR_mesh_quantization is not read)");
     }
     ASPERITY_TRY(const Elements elements, accessors_.read(index));
     const auto first = static_cast<std::uint32_t>(source_.positions.size());
@@ -398,9 +393,9 @@ class SceneGatherer {
       const Vec3 placed = placement.linear * local + placement.offset;
       if (!placed.allFinite()) {
         const bool own = !local.allFinite();
-        return error_at(ErrorCode::bad_mesh,
-                        fmt::format("vertex {} (counted from 0) {}", i, own ? "is not finite" : "is moved to infinity"),
-                        own ? place : node_place, "finite coordinates");
+        return refused(ErrorCode::bad_mesh,
+                       fmt::format("vertex {} (counted from 0) {}", i, own ? "is not finite" : "is moved to infinity"),
+                       own ? place : node_place, "finite coordinates");
       }
       source_.positions.push_back(placed);
     }
@@ -423,7 +418,7 @@ class SceneGatherer {
     const bool narrow = accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
     if (accessor.type != TINYGLTF_TYPE_SCALAR ||
         !(wide || narrow || accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)) {
-      return error_at(ErrorCode::file_malformed, "are not unsigned whole numbers", at, "SCALAR of 5121, 5123 or 5125");
+      return refused(ErrorCode::file_malformed, "are not unsigned whole numbers", at, "SCALAR of 5121, 5123 or 5125");
     }
     ASPERITY_TRY(const Elements elements, accessors_.read(primitive.indices));
     indices.reserve(corners);
@@ -432,8 +427,8 @@ class SceneGatherer {
                                   : narrow ? std::uint32_t{elements.at<std::uint8_t>(i)}
                                            : std::uint32_t{elements.at<std::uint16_t>(i)};
       if (index >= vertices) {
-        return error_at(ErrorCode::bad_mesh, fmt::format("refer to vertex {} of {}", index, vertices), at,
-                        "indices of vertices that are there");
+        return refused(ErrorCode::bad_mesh, fmt::format("refer to vertex {} of {}", index, vertices), at,
+                       "indices of vertices that are there");
       }
       indices.push_back(index);
     }
@@ -447,12 +442,12 @@ class SceneGatherer {
     const bool bytes = type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
     const bool normalised = accessor.normalized && (bytes || type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT);
     if (accessor.type != TINYGLTF_TYPE_VEC2 || !(floats || normalised)) {
-      return error_at(ErrorCode::file_unsupported, "are not two floats or normalised whole numbers", at,
-                      "VEC2 of 5126, or of 5121 or 5123 normalised");
+      return refused(ErrorCode::file_unsupported, "are not two floats or normalised whole numbers", at,
+                     "VEC2 of 5126, or of 5121 or 5123 normalised");
     }
     if (accessor.count != vertices) {
-      return error_at(ErrorCode::bad_mesh, fmt::format("are {} for {} vertices", accessor.count, vertices), at,
-                      "one for each vertex");
+      return refused(ErrorCode::bad_mesh, fmt::format("are {} for {} vertices", accessor.count, vertices), at,
+                     "one for each vertex");
     }
     ASPERITY_TRY(const Elements elements, accessors_.read(index));
     const auto number = [&](std::size_t i) {
@@ -468,8 +463,8 @@ class SceneGatherer {
       const Vec2f placed = look_ != nullptr && look_->moved ? look_->transform(stored) : stored;
       uvs.emplace_back(placed.x(), 1.0F - placed.y());
       if (!uvs.back().allFinite()) {
-        return error_at(ErrorCode::bad_mesh, fmt::format("of vertex {} (counted from 0) are not finite", i), at,
-                        "finite coordinates");
+        return refused(ErrorCode::bad_mesh, fmt::format("of vertex {} (counted from 0) are not finite", i), at,
+                       "finite coordinates");
       }
     }
     return uvs;
@@ -555,7 +550,7 @@ class SceneGatherer {
 Result<GltfTriangles> read_triangles(GltfDocument& document, const PrimitiveLooks* looks) {
   const std::string& json = document.geometry_json();
   if (json.size() > std::numeric_limits<unsigned int>::max()) {
-    return error_at(ErrorCode::too_large, "has more than 4 GiB of JSON", {}, "a smaller file");
+    return refused(ErrorCode::too_large, "has more than 4 GiB of JSON", {}, "a smaller file");
   }
   tinygltf::Model model;
   tinygltf::TinyGLTF reader;
@@ -564,11 +559,11 @@ Result<GltfTriangles> read_triangles(GltfDocument& document, const PrimitiveLook
   // The JSON names neither buffers nor images any more: nothing is opened here.
   if (!reader.LoadASCIIFromString(&model, &error, &warning, json.data(), static_cast<unsigned int>(json.size()), {})) {
     while (!error.empty() && (error.back() == '\n' || error.back() == '.')) error.pop_back();
-    return error_at(ErrorCode::file_malformed, "cannot be read as glTF: " + error.substr(0, 200), {},
-                    "a glTF 2.0 file (.gltf or .glb)");
+    return refused(ErrorCode::file_malformed, "cannot be read as glTF: " + error.substr(0, 200), {},
+                   "a glTF 2.0 file (.gltf or .glb)");
   }
   if (looks != nullptr && looks->size() != model.meshes.size()) {
-    return error_at(ErrorCode::file_malformed, "has meshes that cannot be read", "meshes", "a complete glTF file");
+    return refused(ErrorCode::file_malformed, "has meshes that cannot be read", "meshes", "a complete glTF file");
   }
   return SceneGatherer(model, document, looks).run();
 }

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "asperity/io/atomic_file.h"
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/gltf_material.h"
 #include "asperity/io/image_io.h"
 
@@ -23,16 +24,6 @@ static_assert(std::endian::native == std::endian::little, "glTF's buffers are li
 
 constexpr std::uint64_t largest_file = std::numeric_limits<std::uint32_t>::max();
 constexpr const char* extension_name = "MPEG_haptic_material";
-
-Error error_at(ErrorCode code, std::string what, std::string place, std::string accepted) {
-  return {code, std::move(what), {}, std::move(place), std::move(accepted)};
-}
-
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
-}
 
 std::string base64(std::string_view bytes) {
   constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -103,30 +94,30 @@ class GltfWriter {
 
  private:
   static Error too_large(std::uint64_t size) {
-    return error_at(ErrorCode::too_large, fmt::format("would have {} bytes", size), {}, "up to 4 GiB");
+    return refused(ErrorCode::too_large, fmt::format("would have {} bytes", size), {}, "up to 4 GiB");
   }
 
   [[nodiscard]] Status check() const {
     if (mesh_.triangles.empty())
-      return error_at(ErrorCode::bad_mesh, "has no triangles", "mesh", "at least one triangle");
+      return refused(ErrorCode::bad_mesh, "has no triangles", "mesh", "at least one triangle");
     if (!mesh_.corner_uvs.empty() && mesh_.corner_uvs.size() != mesh_.triangles.size()) {
-      return error_at(ErrorCode::mismatch,
-                      fmt::format("has UVs for {} of {} triangles", mesh_.corner_uvs.size(), mesh_.triangles.size()),
-                      "mesh", "none, or those of every triangle");
+      return refused(ErrorCode::mismatch,
+                     fmt::format("has UVs for {} of {} triangles", mesh_.corner_uvs.size(), mesh_.triangles.size()),
+                     "mesh", "none, or those of every triangle");
     }
     if (!material_of_triangle_.empty()) {
       const auto most = *std::max_element(material_of_triangle_.begin(), material_of_triangle_.end());
       if (material_of_triangle_.size() != mesh_.triangles.size() || most >= materials_.size()) {
-        return error_at(ErrorCode::mismatch,
-                        fmt::format("are {} for {} triangles, up to {} of {} materials", material_of_triangle_.size(),
-                                    mesh_.triangles.size(), most, materials_.size()),
-                        "material_of_triangle", "one number of a material for every triangle");
+        return refused(ErrorCode::mismatch,
+                       fmt::format("are {} for {} triangles, up to {} of {} materials", material_of_triangle_.size(),
+                                   mesh_.triangles.size(), most, materials_.size()),
+                       "material_of_triangle", "one number of a material for every triangle");
       }
     }
     for (std::size_t m = 0; m < materials_.size(); ++m) {
       if (materials_[m].felt() && mesh_.corner_uvs.empty()) {
-        return error_at(ErrorCode::mismatch, "has maps, but the mesh has no UVs", fmt::format("materials[{}]", m),
-                        "a mesh with UVs");
+        return refused(ErrorCode::mismatch, "has maps, but the mesh has no UVs", fmt::format("materials[{}]", m),
+                       "a mesh with UVs");
       }
     }
     return success();
@@ -175,8 +166,8 @@ class GltfWriter {
         for (int axis = 0; axis < 3; ++axis) {
           const auto value = static_cast<float>(mesh_.positions[position][axis]);
           if (!std::isfinite(value)) {
-            return error_at(ErrorCode::bad_mesh, fmt::format("vertex {} is beyond single precision", position), "mesh",
-                            "coordinates that are finite as floats");
+            return refused(ErrorCode::bad_mesh, fmt::format("vertex {} is beyond single precision", position), "mesh",
+                           "coordinates that are finite as floats");
           }
           positions.push_back(value);
         }
@@ -212,14 +203,13 @@ class GltfWriter {
   }
 
   Result<std::size_t> add_texture(const GltfTexture& texture, const std::string& place) {
-    if (!texture.image) return error_at(ErrorCode::bad_value, "has no image", place, "an image");
+    if (!texture.image) return bad_value("has no image", place, "an image");
     const std::pair<const Image*, Wrap> key{texture.image.get(), texture.wrap};
     if (const auto known = textures_.find(key); known != textures_.end()) return known->second;
     if (!images_.contains(key.first)) {
-      Result<std::string> png = encode_png(*texture.image);
-      if (!png) return std::move(png).error().at(place);
+      ASPERITY_TRY(const std::string png, at_place(encode_png(*texture.image), place));
       images_[key.first] = root_["images"].size();
-      root_["images"].push_back({{"bufferView", add_view(*png, 0)}, {"mimeType", "image/png"}});
+      root_["images"].push_back({{"bufferView", add_view(png, 0)}, {"mimeType", "image/png"}});
     }
     if (!samplers_.contains(texture.wrap)) {
       const int mode = texture.wrap == Wrap::clamp ? 33071 : 10497;
@@ -237,15 +227,15 @@ class GltfWriter {
     if (!material.name.empty()) json["name"] = material.name;
     if (material.normals) {
       if (!std::isfinite(material.normals->scale))
-        return error_at(ErrorCode::bad_value, "is not finite", place + ".normals.scale", "a finite number");
+        return bad_value("is not finite", place + ".normals.scale", "a finite number");
       ASPERITY_TRY(json["normalTexture"]["index"], add_texture(material.normals->texture, place + ".normals"));
       if (material.normals->scale != 1.0) json["normalTexture"]["scale"] = material.normals->scale;
     }
     if (material.height) {
       const GltfHeight& height = *material.height;
       if (!(height.amplitude >= 0.0) || !std::isfinite(height.amplitude) || !std::isfinite(height.offset)) {
-        return error_at(ErrorCode::bad_value, fmt::format("is {} m over {} m", height.amplitude, height.offset),
-                        place + ".height", "an amplitude of 0 or more and a finite offset");
+        return bad_value(fmt::format("is {} m over {} m", height.amplitude, height.offset), place + ".height",
+                         "an amplitude of 0 or more and a finite offset");
       }
       Json& own = json["extras"]["asperity"];
       ASPERITY_TRY(own["height_texture"]["index"], add_texture(height.texture, place + ".height"));
@@ -268,8 +258,7 @@ class GltfWriter {
       ASPERITY_TRY(entry["texture"]["index"], add_texture(map->texture, at));
       if (map->stated) {
         if (!std::isfinite(map->black) || !std::isfinite(map->white) || map->black < 0.0 || map->white < 0.0)
-          return error_at(ErrorCode::bad_value, fmt::format("is {} to {}", map->black, map->white), at,
-                          "two numbers of 0 or more");
+          return bad_value(fmt::format("is {} to {}", map->black, map->white), at, "two numbers of 0 or more");
         entry["extras"]["asperity"] = {{"black", map->black}, {"white", map->white}};
       }
       json[property].push_back(std::move(entry));
@@ -284,8 +273,7 @@ class GltfWriter {
       ASPERITY_TRY(entry["texture"]["index"], add_texture(kept.texture, at));
       if (!kept.extras.empty()) {
         entry["extras"] = Json::parse(kept.extras, nullptr, false);
-        if (entry["extras"].is_discarded())
-          return error_at(ErrorCode::bad_value, "is not JSON", at + ".extras", "JSON, or nothing");
+        if (entry["extras"].is_discarded()) return bad_value("is not JSON", at + ".extras", "JSON, or nothing");
       }
       json[kept.property].push_back(std::move(entry));
     }
@@ -309,13 +297,13 @@ class GltfWriter {
 Result<std::string> encode(const std::filesystem::path& path, const MeshView& mesh,
                            std::span<const std::uint32_t> material_of_triangle,
                            std::span<const GltfMaterial> materials) {
-  if (!is_gltf_path(path)) return error_at(ErrorCode::bad_value, "is no name of a glTF file", {}, ".glb, .gltf");
+  if (!is_gltf_path(path)) return bad_value("is no name of a glTF file", {}, ".glb, .gltf");
   try {
     GltfWriter writer(mesh, material_of_triangle, materials);
     ASPERITY_CHECK(writer.run());
     return lower_extension(path) == ".glb" ? writer.binary() : writer.text();
   } catch (const std::bad_alloc&) {
-    return error_at(ErrorCode::too_large, "there is no memory to write it", {}, "a smaller model");
+    return refused(ErrorCode::too_large, "there is no memory to write it", {}, "a smaller model");
   }
 }
 
@@ -328,9 +316,8 @@ bool is_gltf_path(const std::filesystem::path& path) {
 
 Status write_gltf(const std::filesystem::path& path, const MeshView& mesh,
                   std::span<const std::uint32_t> material_of_triangle, std::span<const GltfMaterial> materials) {
-  Result<std::string> bytes = encode(path, mesh, material_of_triangle, materials);
-  if (!bytes) return std::move(bytes).error().in_file(path.string());
-  return write_file_atomically(path, *bytes);
+  ASPERITY_TRY(const std::string bytes, in_file(encode(path, mesh, material_of_triangle, materials), path.string()));
+  return write_file_atomically(path, bytes);
 }
 
 }  // namespace asperity

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "asperity/io/atomic_file.h"
+#include "asperity/io/detail/file_reading.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -53,8 +54,9 @@ constexpr std::uintmax_t largest_image_file = std::uintmax_t{1} << 31U;
 /// more than this many samples a byte promises what the file cannot hold, and is refused before allocating.
 constexpr std::size_t most_image_pixels_a_byte = 1100 * 8;
 
-Error image_error(ErrorCode code, std::string what, const std::string& name, std::string place = "") {
-  return Error{code, std::move(what), name, std::move(place), accepted_images};
+Error image_error(ErrorCode code, std::string what, const std::string& name, std::string place = "",
+                  std::string accepted = accepted_images) {
+  return Error{code, std::move(what), name, std::move(place), std::move(accepted)};
 }
 
 Status check_size(std::uint64_t width, std::uint64_t height, std::size_t bytes, const std::string& name) {
@@ -63,9 +65,8 @@ Status check_size(std::uint64_t width, std::uint64_t height, std::size_t bytes, 
                        name);
   }
   if (width > max_pixels || height > max_pixels || width * height > max_pixels) {
-    Error error = image_error(ErrorCode::too_large, fmt::format("the image has {} x {} pixels", width, height), name);
-    error.accepted = fmt::format("at most {} pixels", max_pixels);
-    return error;
+    return image_error(ErrorCode::too_large, fmt::format("the image has {} x {} pixels", width, height), name, "",
+                       fmt::format("at most {} pixels", max_pixels));
   }
   if (width * height / most_image_pixels_a_byte > bytes) {
     return image_error(ErrorCode::file_truncated,
@@ -235,7 +236,7 @@ Result<std::string> encode_valid_png(const Image& image) {
   auto rows = row_pointers(bytes.data(), file.height, bytes.size() / file.height);
   if (file.info == nullptr ||
       !write_png_rows(file, colour_types[static_cast<std::size_t>(image.channels)], rows.data())) {
-    return Error{ErrorCode::bad_value, fmt::format("cannot be written as PNG: {}", file.message.data()), "", "", ""};
+    return bad_value(fmt::format("cannot be written as PNG: {}", file.message.data()), "", "");
   }
   return std::move(file.output);
 }
@@ -357,8 +358,15 @@ Result<std::string> read_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-bool starts_with(std::string_view bytes, std::string_view signature) {
-  return bytes.substr(0, signature.size()) == signature;
+/// What `decode` makes of the file's bytes and its name.
+template <class T, class Decode>
+Result<T> decoded(const std::filesystem::path& path, const Decode& decode) {
+  try {
+    ASPERITY_TRY(const std::string bytes, read_bytes(path));
+    return decode(bytes, path.string());
+  } catch (const std::exception& error) {
+    return image_error(ErrorCode::file_missing, fmt::format("cannot be read: {}", error.what()), path.string());
+  }
 }
 
 }  // namespace
@@ -368,9 +376,9 @@ Result<Image> read_image_bytes(std::string_view bytes, const std::string& name) 
   try {
     if (bytes.empty()) return image_error(ErrorCode::file_empty, "the file is empty", name);
     constexpr std::string_view png_signature = "\x89PNG\r\n\x1a\n"sv;
-    if (starts_with(bytes, png_signature)) return read_png(bytes, name);
-    if (starts_with(bytes, "\xff\xd8\xff"sv)) return read_jpeg(bytes, name);
-    if (starts_with(png_signature, bytes)) {
+    if (bytes.starts_with(png_signature)) return read_png(bytes, name);
+    if (bytes.starts_with("\xff\xd8\xff")) return read_jpeg(bytes, name);
+    if (png_signature.starts_with(bytes)) {
       return image_error(ErrorCode::file_truncated, "the file ends within the PNG signature", name);
     }
     if (is_exr(bytes)) {
@@ -383,26 +391,18 @@ Result<Image> read_image_bytes(std::string_view bytes, const std::string& name) 
 }
 
 Result<Image> read_image(const std::filesystem::path& path) {
-  try {
-    ASPERITY_TRY(const std::string bytes, read_bytes(path));
-    return read_image_bytes(bytes, path.string());
-  } catch (const std::exception& error) {
-    return image_error(ErrorCode::file_missing, fmt::format("cannot be read: {}", error.what()), path.string());
-  }
+  return decoded<Image>(path, read_image_bytes);
 }
 
 Result<FloatImage> read_float_image(const std::filesystem::path& path, const std::string& channel) {
-  try {
-    ASPERITY_TRY(const std::string bytes, read_bytes(path));
-    return read_float_image_bytes(bytes, path.string(), channel);
-  } catch (const std::exception& error) {
-    return image_error(ErrorCode::file_missing, fmt::format("cannot be read: {}", error.what()), path.string());
-  }
+  return decoded<FloatImage>(path, [&](std::string_view bytes, const std::string& name) {
+    return read_float_image_bytes(bytes, name, channel);
+  });
 }
 
 Result<HeightMap> float_heights(const FloatImage& image, const HeightMapSettings& settings, bool normalised) {
   const auto bad = [](const char* place, double value, const char* accepted) {
-    return Error{ErrorCode::bad_value, fmt::format("is {}", value), "", place, accepted};
+    return bad_value(fmt::format("is {}", value), place, accepted);
   };
   if (!std::isfinite(settings.amplitude) || settings.amplitude < 0.0)
     return bad("amplitude", settings.amplitude, "a length of 0 or more");
@@ -421,19 +421,18 @@ Result<HeightMap> float_heights(const FloatImage& image, const HeightMapSettings
 Result<std::string> encode_png(const Image& image) {
   ASPERITY_CHECK(validate(image));
   if (image.bits == 8 && std::any_of(image.samples.begin(), image.samples.end(), [](int v) { return v > 255; })) {
-    return Error{ErrorCode::bad_value, "an 8-bit image holds a sample above 255", "", "", "samples of 0 to 255"};
+    return bad_value("an 8-bit image holds a sample above 255", "", "samples of 0 to 255");
   }
   try {
     return encode_valid_png(image);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "there is no memory to write the image", "", "", "a smaller image"};
+    return refused(ErrorCode::too_large, "there is no memory to write the image", {}, "a smaller image");
   }
 }
 
 Status write_png(const std::filesystem::path& path, const Image& image) {
-  auto bytes = encode_png(image);
-  if (!bytes) return std::move(bytes).error().in_file(path.string());
-  return write_file_atomically(path, *bytes);
+  ASPERITY_TRY(const std::string bytes, in_file(encode_png(image), path.string()));
+  return write_file_atomically(path, bytes);
 }
 
 }  // namespace asperity

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "asperity/io/atomic_file.h"
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/detail/mesh_readers.h"
 
 namespace asperity {
@@ -15,12 +16,6 @@ namespace {
 
 constexpr std::uintmax_t largest_mesh_file = std::uintmax_t{4} << 30U;
 constexpr const char* accepted_formats = "an OBJ, PLY, STL or glTF file";
-
-std::string lower_extension(const std::string& name) {
-  std::string extension = std::filesystem::path(name).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
-}
 
 bool has_obj_vertex(std::string_view bytes) {
   mesh_readers::TextCursor cursor(bytes);
@@ -48,7 +43,7 @@ Result<MeshSource> read_by_format(std::string_view bytes, const std::string& nam
 }
 
 Error missing(const std::filesystem::path& path, std::string what) {
-  return {ErrorCode::file_missing, std::move(what), path.string(), {}, accepted_formats};
+  return refused_file(ErrorCode::file_missing, std::move(what), path.string(), accepted_formats);
 }
 
 Result<std::string> read_file(const std::filesystem::path& path) {
@@ -60,9 +55,8 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   const std::uintmax_t size = std::filesystem::file_size(path, problem);
   std::ifstream stream(path, std::ios::binary);
   if (problem || !stream) return missing(path, "cannot be opened for reading");
-  if (size > largest_mesh_file) {
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), path.string(), {}, "files up to 4 GiB"};
-  }
+  if (size > largest_mesh_file)
+    return refused_file(ErrorCode::too_large, fmt::format("has {} bytes", size), path.string(), "files up to 4 GiB");
   std::string bytes(static_cast<std::size_t>(size), '\0');
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uintmax_t>(stream.gcount()) != size) return missing(path, "cannot be read to its end");
@@ -73,11 +67,9 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 Result<MeshSource> read_named_mesh(std::string_view bytes, const std::string& name,
                                    const std::filesystem::path* folder) {
   try {
-    Result<MeshSource> source = read_by_format(bytes, name, folder);
-    if (source) return source;
-    return std::move(source).error().in_file(name);
+    return in_file(read_by_format(bytes, name, folder), name);
   } catch (const std::exception& problem) {
-    return Error{ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name, {}, {}};
+    return refused_file(ErrorCode::too_large, fmt::format("cannot be held in memory ({})", problem.what()), name);
   }
 }
 
@@ -129,6 +121,11 @@ std::string_view TextCursor::next_word() {
   const std::size_t begin = at_;
   while (at_ < text_.size() && !is_blank(text_[at_]) && text_[at_] != '\n') ++at_;
   return text_.substr(begin, at_ - begin);
+}
+
+bool same_word(std::string_view a, std::string_view b) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  return std::ranges::equal(a, b, {}, lower, lower);
 }
 
 std::string_view take_word(std::string_view& line) {
@@ -206,7 +203,8 @@ Status write_ply(const std::filesystem::path& path, const MeshView& mesh) {
 
 Status write_stl(const std::filesystem::path& path, const MeshView& mesh) {
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
-    return Error{ErrorCode::file_unwritable, "has more triangles than an STL file can count", path.string(), {}, "PLY"};
+    return refused_file(ErrorCode::file_unwritable, "has more triangles than an STL file can count", path.string(),
+                        "PLY");
   }
   std::string bytes(80, '\0');
   append(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));

@@ -18,16 +18,12 @@ constexpr std::size_t size_of(Scalar type) {
 }
 
 std::optional<Scalar> scalar_named(std::string_view name) {
-  constexpr std::array<std::array<std::string_view, 2>, 8> names = {{{"char", "int8"},
-                                                                     {"uchar", "uint8"},
-                                                                     {"short", "int16"},
-                                                                     {"ushort", "uint16"},
-                                                                     {"int", "int32"},
-                                                                     {"uint", "uint32"},
-                                                                     {"float", "float32"},
-                                                                     {"double", "float64"}}};
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (name == names[i][0] || name == names[i][1]) return static_cast<Scalar>(i);
+  constexpr std::array<std::string_view, 8> old = {"char", "uchar", "short", "ushort",
+                                                   "int",  "uint",  "float", "double"};
+  constexpr std::array<std::string_view, 8> sized = {"int8",  "uint8",  "int16",   "uint16",
+                                                     "int32", "uint32", "float32", "float64"};
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    if (name == old[i] || name == sized[i]) return static_cast<Scalar>(i);
   }
   return std::nullopt;
 }
@@ -84,7 +80,7 @@ class HeaderReader {
 
  private:
   [[nodiscard]] Error error(std::string what) const {
-    return {ErrorCode::file_malformed, std::move(what), {}, cursor_.place(), accepted_header};
+    return refused(ErrorCode::file_malformed, std::move(what), cursor_.place(), accepted_header);
   }
 
   Result<Header> finish() {
@@ -95,16 +91,11 @@ class HeaderReader {
   }
 
   Status read_format(std::string_view line) {
+    constexpr std::array<std::string_view, 3> encodings = {"ascii", "binary_little_endian", "binary_big_endian"};
     const std::string_view name = take_word(line);
-    if (name == "ascii") {
-      header_.encoding = Encoding::ascii;
-    } else if (name == "binary_little_endian") {
-      header_.encoding = Encoding::little;
-    } else if (name == "binary_big_endian") {
-      header_.encoding = Encoding::big;
-    } else {
-      return error(fmt::format("has the unknown format '{}'", name.substr(0, 40)));
-    }
+    const auto found = std::find(encodings.begin(), encodings.end(), name);
+    if (found == encodings.end()) return error(fmt::format("has the unknown format '{}'", name.substr(0, 40)));
+    header_.encoding = static_cast<Encoding>(found - encodings.begin());
     if (take_word(line) != "1.0") return error("is not of PLY version 1.0");
     has_format_ = true;
     return success();
@@ -153,11 +144,8 @@ class ValueReader {
     if (header_.encoding != Encoding::ascii) return next_binary(type, value);
     const std::string_view word = cursor_.next_word();
     if (word.empty()) return truncated();
-    if (!parse_number(word, value)) {
-      return Error{
-          ErrorCode::file_malformed, fmt::format("'{}' is no number", word.substr(0, 40)), {}, place(), "numbers"};
-    }
-    return success();
+    if (parse_number(word, value)) return success();
+    return refused(ErrorCode::file_malformed, fmt::format("'{}' is no number", word.substr(0, 40)), place(), "numbers");
   }
 
   /// Refuses a count that the rest of the file cannot hold, before any memory is set aside for it.
@@ -168,18 +156,13 @@ class ValueReader {
     }
     const std::size_t used = header_.encoding == Encoding::ascii ? cursor_.offset() : at_;
     const std::size_t left = bytes_.size() - std::min(used, bytes_.size());
-    if (least > 0 && element.count <= left / least) return success();
-    if (element.count == 0) return success();
+    if (element.count == 0 || (least > 0 && element.count <= left / least)) return success();
     if (least == 0) {
       return refused(ErrorCode::file_malformed, fmt::format("element {} has no properties", element.name), {},
                      accepted_header);
     }
-    return Error{
-        ErrorCode::file_truncated,
-        fmt::format("promises {} entries of {}, more than its {} bytes can hold", element.count, element.name, left),
-        {},
-        place(),
-        "a complete PLY file"};
+    return truncated(
+        fmt::format("promises {} entries of {}, more than its {} bytes can hold", element.count, element.name, left));
   }
 
   [[nodiscard]] std::string place() const {
@@ -188,9 +171,8 @@ class ValueReader {
   }
 
  private:
-  [[nodiscard]] Error truncated() const {
-    return {
-        ErrorCode::file_truncated, "ends before the data that its header promises", {}, place(), "a complete PLY file"};
+  [[nodiscard]] Error truncated(std::string what = "ends before the data that its header promises") const {
+    return refused(ErrorCode::file_truncated, std::move(what), place(), "a complete PLY file");
   }
 
   template <class Number>

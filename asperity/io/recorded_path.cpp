@@ -11,6 +11,8 @@
 #include <optional>
 #include <utility>
 
+#include "asperity/io/detail/file_reading.h"
+
 namespace asperity {
 namespace {
 
@@ -99,13 +101,12 @@ void start_at_zero(std::vector<TimedPoint>& points) {
 Result<std::string> read_text(const std::string& path) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) {
-    return Error{ErrorCode::file_unsupported, "is a folder", path, {}, "a CSV file or a trace"};
+    return refused_file(ErrorCode::file_unsupported, "is a folder", path, "a CSV file or a trace");
   }
   std::ifstream file(path, std::ios::binary);
-  if (!file) return Error{ErrorCode::file_missing, "cannot be read", path, {}, "a CSV file or a trace"};
-  if (const auto size = std::filesystem::file_size(path, code); !code && size > max_file_bytes) {
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), path, {}, "1 GiB at most"};
-  }
+  if (!file) return refused_file(ErrorCode::file_missing, "cannot be read", path, "a CSV file or a trace");
+  if (const auto size = std::filesystem::file_size(path, code); !code && size > max_file_bytes)
+    return refused_file(ErrorCode::too_large, fmt::format("has {} bytes", size), path, "1 GiB at most");
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
@@ -141,8 +142,7 @@ Result<std::vector<TimedPoint>> parse_recorded_path(std::string_view text) {
 
 Result<std::vector<TimedPoint>> recorded_path_from(const Trace& trace) {
   if (trace.records.size() < 2) {
-    return Error{
-        ErrorCode::mismatch, fmt::format("the trace has {} ticks", trace.records.size()), {}, {}, "two or more"};
+    return refused(ErrorCode::mismatch, fmt::format("the trace has {} ticks", trace.records.size()), {}, "two or more");
   }
   std::vector<TimedPoint> points;
   for (const TraceRecord& record : trace.records) {
@@ -159,16 +159,12 @@ Result<std::vector<TimedPoint>> recorded_path_from(const Trace& trace) {
 }
 
 Result<std::vector<TimedPoint>> read_recorded_path(const std::string& path) {
-  const auto in_file = [&](Result<std::vector<TimedPoint>> result) -> Result<std::vector<TimedPoint>> {
-    if (!result) return std::move(result).error().in_file(path);
-    return result;
-  };
   if (is_trace_file(path)) {
     ASPERITY_TRY(const Trace trace, read_trace(path));
-    return in_file(recorded_path_from(trace));
+    return in_file(recorded_path_from(trace), path);
   }
   ASPERITY_TRY(const std::string text, read_text(path));
-  return in_file(parse_recorded_path(text));
+  return in_file(parse_recorded_path(text), path);
 }
 
 std::string_view csv_trimmed(std::string_view text) {

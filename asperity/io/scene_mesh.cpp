@@ -106,13 +106,8 @@ class GeneratorReader {
     } else if (given != nullptr) {
       angles.clear();
       for (std::size_t i = 0; i < given->size(); ++i) {
-        const SceneJson wrapped = SceneJson{{"fold_angles", (*given)[i]}};
-        ObjectReader one(wrapped, reader_.place_of("fold_angles", i), "mesh generator");
-        angles.push_back(one.quantity("fold_angles", Dimension::angle, 0.0, Range{10.0 * degree, 180.0 * degree}));
-        if (!one.error()) continue;
-        Error error = *one.error();
-        error.place = one.place();
-        reader_.fail(std::move(error));
+        angles.push_back(reader_.value_of((*given)[i], reader_.place_of("fold_angles", i), Dimension::angle,
+                                          Range{10.0 * degree, 180.0 * degree}));
       }
     }
     reader_.write("fold_angles", angles);

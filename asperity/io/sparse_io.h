@@ -41,8 +41,6 @@ using SparseWriter = Status (*)(const std::filesystem::path&, const SparseGrid&,
                                 const Progress&);
 /// Hands over what reads and writes .vdb files (asperity/io/vdb). nullptr takes it away. [main]
 void register_sparse_files(SparseReader reader, SparseWriter writer);
-/// Whether they were handed over. [any]
-bool has_sparse_files();
 /// Whether a path is, by its name, a .vdb file. [any]
 bool is_sparse_path(const std::filesystem::path& path);
 

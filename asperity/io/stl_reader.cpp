@@ -60,9 +60,9 @@ class AsciiReader {
       const std::string_view word = cursor_.next_word();
       if (word.empty() && within) return unexpected(word, "facet or endsolid");
       if (word.empty()) break;
-      if (within && is(word, "facet")) {
+      if (within && same_word(word, "facet")) {
         ASPERITY_CHECK(read_facet());
-      } else if (within ? is(word, "endsolid") : is(word, "solid")) {
+      } else if (within ? same_word(word, "endsolid") : same_word(word, "solid")) {
         cursor_.next_line(name);
         within = !within;
       } else {
@@ -74,30 +74,18 @@ class AsciiReader {
   }
 
  private:
-  static bool is(std::string_view word, std::string_view keyword) {
-    return word.size() == keyword.size() && std::equal(word.begin(), word.end(), keyword.begin(), [](char a, char b) {
-             return a == b || (a >= 'A' && a <= 'Z' && a - 'A' + 'a' == b);
-           });
-  }
-
   [[nodiscard]] Error unexpected(std::string_view word, std::string_view wanted) const {
     if (word.empty()) {
-      return {ErrorCode::file_truncated,
-              fmt::format("ends where {} should follow", wanted),
-              {},
-              cursor_.place(),
-              "a complete STL file"};
+      return refused(ErrorCode::file_truncated, fmt::format("ends where {} should follow", wanted), cursor_.place(),
+                     "a complete STL file");
     }
-    return {ErrorCode::file_malformed,
-            fmt::format("has '{}' where {} should stand", word.substr(0, 40), wanted),
-            {},
-            cursor_.place(),
-            "facet normal x y z, outer loop, three times vertex x y z, endloop, endfacet"};
+    return refused(ErrorCode::file_malformed, fmt::format("has '{}' where {} should stand", word.substr(0, 40), wanted),
+                   cursor_.place(), "facet normal x y z, outer loop, three times vertex x y z, endloop, endfacet");
   }
 
   Status expect(std::string_view keyword) {
     const std::string_view word = cursor_.next_word();
-    if (is(word, keyword)) return success();
+    if (same_word(word, keyword)) return success();
     return unexpected(word, keyword);
   }
 

@@ -143,7 +143,7 @@ std::string sidecar_path(std::string_view csv_path) {
 Status export_trace(const Trace& trace, const std::string& path) {
   const std::string sidecar = sidecar_path(path);
   if (sidecar == path) {
-    return Error{ErrorCode::bad_value, "is the name of the sidecar as well", path, {}, "a name that ends in .csv"};
+    return bad_value("is the name of the sidecar as well", "", "a name that ends in .csv").in_file(path);
   }
   // The table last: when it is there, its description is.
   ASPERITY_CHECK(write_file_atomically(sidecar, trace_sidecar_json(trace)));

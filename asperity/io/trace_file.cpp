@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include "asperity/io/detail/file_reading.h"
+
 namespace asperity {
 namespace {
 
@@ -64,10 +66,7 @@ class Encoder {
     for (int i = 0; i < 3; ++i) field(v[i]);
   }
   void field(const Quat& q) {
-    field(q.w());
-    field(q.x());
-    field(q.y());
-    field(q.z());
+    for (const double number : {q.w(), q.x(), q.y(), q.z()}) field(number);
   }
   void status(const Flags& flags, const std::uint8_t& level) {
     field(flags.bits() | static_cast<std::uint32_t>(level) << level_shift);
@@ -92,10 +91,7 @@ class Decoder {
     for (int i = 0; i < 3; ++i) field(v[i]);
   }
   void field(Quat& q) {
-    field(q.w());
-    field(q.x());
-    field(q.y());
-    field(q.z());
+    for (double* number : {&q.w(), &q.x(), &q.y(), &q.z()}) field(*number);
   }
   void status(Flags& flags, std::uint8_t& level) {
     const auto bits = static_cast<std::uint32_t>(take(4));
@@ -192,11 +188,8 @@ std::string system_reason(int code) {
 }
 
 Error unwritable(const std::string& path, const std::string& reason) {
-  return Error{ErrorCode::file_unwritable,
-               fmt::format("cannot be written ({})", reason),
-               path,
-               {},
-               "a file in a folder that exists and may be written"};
+  return refused_file(ErrorCode::file_unwritable, fmt::format("cannot be written ({})", reason), path,
+                      "a file in a folder that exists and may be written");
 }
 
 /// Takes away a file that could not even get its header; a device or a pipe stays.
@@ -314,7 +307,7 @@ struct TraceWriter::State {
   }
   /// Why nothing can be written now.
   [[nodiscard]] Error refusal() const {
-    return failure.value_or(Error{ErrorCode::bad_value, "the trace is finished already", path, {}, {}});
+    return failure.value_or(refused_file(ErrorCode::bad_value, "the trace is finished already", path));
   }
   Status flush() {
     if (pending == 0) return success();
@@ -348,7 +341,8 @@ Result<TraceWriter> TraceWriter::open(const std::string& path, const TraceMetada
   }
   const std::string text = to_json(metadata);
   if (text.size() > max_metadata) {
-    return Error{ErrorCode::too_large, fmt::format("metadata has {} bytes", text.size()), path, {}, "256 MiB at most"};
+    return refused_file(ErrorCode::too_large, fmt::format("metadata has {} bytes", text.size()), path,
+                        "256 MiB at most");
   }
   auto state = std::make_unique<State>();
   state->path = path;
@@ -424,24 +418,21 @@ struct Descriptor {
 /// Up to `limit` bytes of a regular file.
 Result<Bytes> read_bytes(const std::string& path, std::size_t limit) {
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  const auto unreadable = [&] {
+    return refused_file(ErrorCode::file_missing, fmt::format("cannot be read ({})", system_reason(errno)), path);
+  };
   struct stat info {};
-  if (file.value < 0 || ::fstat(file.value, &info) != 0) {
-    return Error{ErrorCode::file_missing, fmt::format("cannot be read ({})", system_reason(errno)), path, {}, {}};
-  }
+  if (file.value < 0 || ::fstat(file.value, &info) != 0) return unreadable();
   if (!S_ISREG(info.st_mode)) {
-    return Error{ErrorCode::file_unsupported,
-                 S_ISDIR(info.st_mode) ? "is a folder" : "is no regular file",
-                 path,
-                 {},
-                 "a trace file"};
+    return refused_file(ErrorCode::file_unsupported, S_ISDIR(info.st_mode) ? "is a folder" : "is no regular file", path,
+                        "a trace file");
   }
   Bytes bytes(std::min(limit, static_cast<std::size_t>(info.st_size)));
   std::size_t have = 0;
   while (have < bytes.size()) {
     const ssize_t count = ::read(file.value, bytes.data() + have, bytes.size() - have);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0)
-      return Error{ErrorCode::file_missing, fmt::format("cannot be read ({})", system_reason(errno)), path, {}, {}};
+    if (count < 0) return unreadable();
     if (count == 0) break;
     have += static_cast<std::size_t>(count);
   }
@@ -459,22 +450,17 @@ Error truncated_header(std::size_t size, std::size_t needed) {
                  fmt::format("byte {}", size));
 }
 
-std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  Decoder(bytes.subspan(at, 4)).field(value);
-  return value;
-}
-
-std::uint64_t u64_at(std::span<const std::byte> bytes, std::size_t at) {
-  std::uint64_t value = 0;
-  Decoder(bytes.subspan(at, 8)).field(value);
+template <class Number>
+Number number_at(std::span<const std::byte> bytes, std::size_t at) {
+  Number value = 0;
+  Decoder(bytes.subspan(at, sizeof(Number))).field(value);
   return value;
 }
 
 /// Checks the fixed part of the header; gives the length of the whole header.
 Result<std::size_t> check_header(std::span<const std::byte> bytes) {
   const auto refuse = [](ErrorCode code, std::string what, std::size_t at, std::string accepted) {
-    return Error{code, std::move(what), {}, fmt::format("byte {}", at), std::move(accepted)};
+    return refused(code, std::move(what), fmt::format("byte {}", at), std::move(accepted));
   };
   if (bytes.empty()) return refused(ErrorCode::file_empty, "is empty", {}, "a trace file");
   if (!begins_like_a_trace(bytes)) {
@@ -482,24 +468,24 @@ Result<std::size_t> check_header(std::span<const std::byte> bytes) {
                   "a file written by asperity, which begins with ASPTRACE");
   }
   if (bytes.size() < header_fixed) return truncated_header(bytes.size(), header_fixed);
-  if (u32_at(bytes, 12) != byte_order_mark) {
+  if (number_at<std::uint32_t>(bytes, 12) != byte_order_mark) {
     return refuse(ErrorCode::file_unsupported, "has another byte order, or its header is damaged", 12, "little-endian");
   }
-  if (const std::uint32_t version = u32_at(bytes, 8); version != trace_format_version) {
+  if (const std::uint32_t version = number_at<std::uint32_t>(bytes, 8); version != trace_format_version) {
     return refuse(ErrorCode::file_unsupported,
                   fmt::format("has version {} of the trace format, or its header is damaged", version), 8,
                   fmt::format("version {}", trace_format_version));
   }
-  const std::uint32_t length = u32_at(bytes, 20);
+  const std::uint32_t length = number_at<std::uint32_t>(bytes, 20);
   if (length > max_metadata) {
     return refuse(ErrorCode::file_malformed, fmt::format("header is damaged: metadata of {} bytes", length), 20, {});
   }
   const std::size_t total = header_fixed + length + 4;
   if (bytes.size() < total) return truncated_header(bytes.size(), total);
-  if (crc32(bytes.first(total - 4)) != u32_at(bytes, total - 4)) {
+  if (crc32(bytes.first(total - 4)) != number_at<std::uint32_t>(bytes, total - 4)) {
     return refuse(ErrorCode::file_malformed, "header is damaged: its checksum does not match", total - 4, {});
   }
-  if (const std::uint32_t size = u32_at(bytes, 16); size != record_bytes()) {
+  if (const std::uint32_t size = number_at<std::uint32_t>(bytes, 16); size != record_bytes()) {
     return refuse(ErrorCode::file_unsupported, fmt::format("has records of {} bytes", size), 16,
                   fmt::format("records of {} bytes", record_bytes()));
   }
@@ -537,13 +523,13 @@ class FrameReader {
   std::optional<std::size_t> frame(std::size_t at) {
     const std::size_t left = bytes_.size() - at;
     if (left < frame_overhead) return stop(fmt::format("is cut inside the frame at byte {}", at));
-    const std::size_t length = u32_at(bytes_, at);
+    const std::size_t length = number_at<std::uint32_t>(bytes_, at);
     if (length > left - frame_overhead) return stop(fmt::format("is cut or damaged in the frame at byte {}", at));
     const auto content = bytes_.subspan(at, 8 + length);
-    if (crc32(content) != u32_at(bytes_, at + 8 + length)) {
+    if (crc32(content) != number_at<std::uint32_t>(bytes_, at + 8 + length)) {
       return stop(fmt::format("is damaged in the frame at byte {}: its checksum does not match", at));
     }
-    const std::uint32_t type = u32_at(bytes_, at + 4);
+    const std::uint32_t type = number_at<std::uint32_t>(bytes_, at + 4);
     const auto payload = content.subspan(8);
     const bool good = type == frame_records ? records(payload) : type == frame_end && end(payload);
     if (!good) return stop(fmt::format("has a frame at byte {} that contradicts itself", at));
@@ -553,7 +539,7 @@ class FrameReader {
   bool records(std::span<const std::byte> payload) {
     const std::size_t size = record_bytes();
     if (payload.size() < 4) return false;
-    const std::size_t count = u32_at(payload, 0);
+    const std::size_t count = number_at<std::uint32_t>(payload, 0);
     if (payload.size() != 4 + count * size) return false;
     for (std::size_t i = 0; i < count; ++i) {
       Decoder decoder(payload.subspan(4 + i * size, size));
@@ -567,7 +553,8 @@ class FrameReader {
 
   bool end(std::span<const std::byte> payload) {
     if (payload.size() != 16) return false;
-    trace_.complete = u64_at(payload, 0) == trace_.records.size() && u64_at(payload, 8) == hash_.value();
+    trace_.complete = number_at<std::uint64_t>(payload, 0) == trace_.records.size() &&
+                      number_at<std::uint64_t>(payload, 8) == hash_.value();
     return trace_.complete;
   }
 
@@ -590,9 +577,7 @@ Result<Trace> parse_trace(std::span<const std::byte> bytes) {
 
 Result<Trace> read_trace(const std::string& path) {
   ASPERITY_TRY(const Bytes bytes, read_bytes(path, static_cast<std::size_t>(-1)));
-  Result<Trace> trace = parse_trace(bytes);
-  if (!trace) return std::move(trace).error().in_file(path);
-  return trace;
+  return in_file(parse_trace(bytes), path);
 }
 
 bool is_trace_file(const std::string& path) {

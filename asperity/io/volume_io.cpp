@@ -9,6 +9,8 @@
 #include <iterator>
 #include <new>
 
+#include "asperity/io/detail/file_reading.h"
+
 namespace asperity {
 namespace {
 
@@ -20,12 +22,6 @@ constexpr const char* accepted_volume_formats =
 std::atomic<VolumeReader>& registered() {
   static std::atomic<VolumeReader> reader{nullptr};
   return reader;
-}
-
-std::string lower_suffix(const fs::path& path) {
-  std::string suffix = path.extension().string();
-  for (char& c : suffix) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return suffix;
 }
 
 bool is_case_folder(const fs::path& path) {
@@ -52,41 +48,34 @@ Result<fs::path> sidecar_of(const fs::path& raw) {
   for (const fs::path& candidate : {appended, replaced}) {
     if (fs::is_regular_file(candidate, ignored) && is_sidecar(candidate)) return candidate;
   }
-  return Error{ErrorCode::file_unsupported,
-               "is raw, and no sidecar tells what it holds",
-               raw.string(),
-               {},
-               fmt::format("a sidecar \"{}\" beside it", appended.filename().string())};
+  return refused_file(ErrorCode::file_unsupported, "is raw, and no sidecar tells what it holds", raw.string(),
+                      fmt::format("a sidecar \"{}\" beside it", appended.filename().string()));
 }
 
 Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
-  if (!fs::exists(status))
-    return Error{ErrorCode::file_missing, "no such file", path.string(), {}, accepted_volume_formats};
+  const auto refuse = [&](ErrorCode code, const char* what) {
+    return refused_file(code, what, path.string(), accepted_volume_formats);
+  };
+  if (!fs::exists(status)) return refuse(ErrorCode::file_missing, "no such file");
   if (needs_volume_reader(path)) {
     const VolumeReader reader = registered();
     if (reader == nullptr) {
-      return Error{ErrorCode::file_unsupported,
-                   "is read with VTK, which this program was built without",
-                   path.string(),
-                   {},
-                   "VTK 9 (Debian: scripts/install-packages volumes) and a new build, or raw samples with a sidecar"};
+      return refused_file(
+          ErrorCode::file_unsupported, "is read with VTK, which this program was built without", path.string(),
+          "VTK 9 (Debian: scripts/install-packages volumes) and a new build, or raw samples with a sidecar");
     }
     return reader(path, request, progress);
   }
-  if (fs::is_directory(status)) {
-    return Error{
-        ErrorCode::file_missing, "is a folder, and no OpenFOAM case", path.string(), {}, accepted_volume_formats};
-  }
-  const std::string suffix = lower_suffix(path);
+  if (fs::is_directory(status)) return refuse(ErrorCode::file_missing, "is a folder, and no OpenFOAM case");
+  const std::string suffix = lower_extension(path);
   if (suffix == ".json") return read_sidecar_volume(path, request, progress);
   if (suffix == ".raw") {
     ASPERITY_TRY(const fs::path sidecar, sidecar_of(path));
     return read_sidecar_volume(sidecar, request, progress);
   }
-  return Error{
-      ErrorCode::file_unsupported, "is no volume format that is read here", path.string(), {}, accepted_volume_formats};
+  return refuse(ErrorCode::file_unsupported, "is no volume format that is read here");
 }
 
 }  // namespace
@@ -106,34 +95,29 @@ std::span<const std::string> volume_reader_suffixes() {
 }
 
 bool needs_volume_reader(const fs::path& path) {
-  const std::string suffix = lower_suffix(path);
+  const std::string suffix = lower_extension(path);
   const std::span<const std::string> suffixes = volume_reader_suffixes();
   return std::find(suffixes.begin(), suffixes.end(), suffix) != suffixes.end() || is_case_folder(path);
 }
 
 bool is_bricked_path(const fs::path& path) {
-  return lower_suffix(path) == ".aspvol";
+  return lower_extension(path) == ".aspvol";
 }
 
 bool is_volume_path(const fs::path& path) {
   if (needs_volume_reader(path) || is_bricked_path(path)) return true;
-  const std::string suffix = lower_suffix(path);
+  const std::string suffix = lower_extension(path);
   return suffix == ".raw" || (suffix == ".json" && is_sidecar(path));
 }
 
 Result<VolumeSource> read_volume(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
   try {
-    Result<VolumeSource> source = read_checked(path, request, progress);
-    if (!source) return std::move(source).error().in_file(path.string());
-    return source;
+    return in_file(read_checked(path, request, progress), path.string());
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", path.string(), {}, "a smaller volume"};
+    return refused_file(ErrorCode::too_large, "needs more memory than there is", path.string(), "a smaller volume");
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::file_malformed,
-                 fmt::format("cannot be read ({})", failure.what()),
-                 path.string(),
-                 {},
-                 accepted_volume_formats};
+    return refused_file(ErrorCode::file_malformed, fmt::format("cannot be read ({})", failure.what()), path.string(),
+                        accepted_volume_formats);
   }
 }
 

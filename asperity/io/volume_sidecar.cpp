@@ -39,11 +39,11 @@ struct Sidecar {
 void read_size(ObjectReader& reader, Sidecar& sidecar) {
   const char* accepted = "three whole numbers of samples, 1 or more, along x, y, z";
   const SceneJson* size = reader.raw("size");
-  if (size == nullptr) return reader.fail("size", "is missing", accepted);
+  if (size == nullptr) return reader.require("size", accepted);
   if (!size->is_array()) return reader.fail_type("size", *size, accepted);
   if (size->size() != 3) return reader.fail("size", fmt::format("has {} numbers", size->size()), accepted);
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::string place = fmt::format("{}[{}]", reader.place_of("size"), a);
+    const std::string place = reader.place_of("size", a);
     const SceneJson& n = (*size)[a];
     if (!n.is_number()) {
       return reader.fail(
@@ -64,25 +64,18 @@ Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, 
   if (value == nullptr) return fallback;
   if (!value->is_array()) {
     reader.fail_type(key, *value, accepted);
-    return fallback;
-  }
-  if (value->size() != 3) {
+  } else if (value->size() != 3) {
     reader.fail(key, fmt::format("has {} numbers", value->size()), accepted);
-    return fallback;
   }
-  Vec3 numbers;
-  for (std::size_t a = 0; a < 3; ++a) {
+  Vec3 numbers = fallback;
+  for (std::size_t a = 0; a < 3 && !reader.failed(); ++a) {
     const SceneJson& number = (*value)[a];
-    const std::string place = fmt::format("{}[{}]", reader.place_of(key), a);
+    const std::string place = reader.place_of(key, a);
+    const double read = number.is_number() ? number.get<double>() : 0.0;
     if (!number.is_number()) {
       reader.fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(number)), place, accepted));
-      return fallback;
-    }
-    const auto read = number.get<double>();
-    if (!std::isfinite(read) || (above_zero && !(read > 0.0))) {
-      reader.fail(Error{
-          ErrorCode::bad_value, fmt::format("is {:g} (axis {})", read, sidecar_axis_names[a]), {}, place, accepted});
-      return fallback;
+    } else if (!std::isfinite(read) || (above_zero && !(read > 0.0))) {
+      reader.fail(bad_value(fmt::format("is {:g} (axis {})", read, sidecar_axis_names[a]), place, accepted));
     }
     numbers[static_cast<int>(a)] = read;
   }
@@ -92,7 +85,7 @@ Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, 
 void read_axis(ObjectReader& reader, const SceneJson& json, std::size_t count, const std::string& place,
                std::vector<double>& nodes) {
   const auto bad = [&](ErrorCode code, std::string what, const std::string& where) {
-    reader.fail(Error{code, std::move(what), {}, where, fmt::format("an array of {} coordinates", count)});
+    reader.fail(refused(code, std::move(what), where, fmt::format("an array of {} coordinates", count)));
   };
   if (!json.is_array()) return bad(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place);
   if (json.size() != count) return bad(ErrorCode::bad_value, fmt::format("has {} coordinates", json.size()), place);
@@ -121,13 +114,10 @@ void read_places(ObjectReader& reader, Sidecar& sidecar) {
   static const std::vector<std::string> keys{"x", "y", "z"};
   ObjectReader axes_reader(*axes, reader.place_of("axes"), "sidecar's axes", keys);
   for (std::size_t a = 0; a < 3 && !axes_reader.failed(); ++a) {
-    const SceneJson* axis = axes_reader.raw(sidecar_axis_names[a]);
-    if (axis == nullptr) {
-      axes_reader.fail(sidecar_axis_names[a], "is missing", "an array of coordinates");
-    } else {
-      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(sidecar_axis_names[a]),
-                sidecar.raw.nodes[a]);
-    }
+    const char* name = sidecar_axis_names[a];
+    axes_reader.require(name, "an array of coordinates");
+    if (const SceneJson* axis = axes_reader.raw(name))
+      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(name), sidecar.raw.nodes[a]);
   }
   reader.take("axes", std::move(axes_reader));
 }
@@ -138,20 +128,16 @@ Result<Sidecar> read_description(std::string_view text, const std::string& name,
   static const std::vector<std::string> associations{to_string(Association::node), to_string(Association::cell)};
   ASPERITY_TRY(const SceneJson json, parse_scene_json(text, name));
   ObjectReader reader(json, "", "volume's sidecar", sidecar_keys);
-  if (!reader.failed() && !reader.has("asperity_volume"))
-    reader.fail("asperity_volume", "is missing", "1, the version of the sidecar's format");
+  reader.require("asperity_volume", "1, the version of the sidecar's format");
   const int version = reader.integer("asperity_volume", 1, 1, 1000000);
   if (version != 1) {
     reader.fail("asperity_volume", fmt::format("is {}, a newer format than this program reads", version), "1",
                 ErrorCode::file_unsupported);
   }
   Sidecar sidecar;
-  sidecar.file = reader.text("file", "");
-  if (sidecar.file.empty()) reader.fail("file", "is missing", "the file of raw samples");
+  sidecar.file = reader.required_text("file", "the file of raw samples");
   if (!reader.failed()) read_size(reader, sidecar);
-  for (const char* key : {"type", "byte_order"}) {
-    if (!reader.has(key)) reader.fail(key, "is missing", "the samples' type and byte order");
-  }
+  for (const char* key : {"type", "byte_order"}) reader.require(key, "the samples' type and byte order");
   sidecar.type = reader.choice("type", SampleType::float32);
   sidecar.big_endian = reader.choice("byte_order", orders, 0) == 1;
   sidecar.raw.components = reader.integer("components", 1, 1, 3);
@@ -160,10 +146,9 @@ Result<Sidecar> read_description(std::string_view text, const std::string& name,
   sidecar.raw.array = reader.text("array", fs::path(sidecar.file).stem().string());
   sidecar.raw.unit = reader.text("unit", "");
   ASPERITY_CHECK(reader.status());
-  Result<std::size_t> count = volume_assembly::sample_count(
-      sidecar.size, sample_bytes(sidecar.type) * static_cast<std::size_t>(sidecar.raw.components), request.most_bytes);
-  if (!count) return std::move(count).error().at("size");
-  sidecar.samples = *count;
+  const std::size_t bytes_each = sample_bytes(sidecar.type) * static_cast<std::size_t>(sidecar.raw.components);
+  ASPERITY_TRY(sidecar.samples,
+               at_place(volume_assembly::sample_count(sidecar.size, bytes_each, request.most_bytes), "size"));
   read_places(reader, sidecar);
   ASPERITY_CHECK(reader.status());
   return sidecar;
@@ -202,15 +187,13 @@ Result<SampleArray> load_samples(const Sidecar& sidecar, Fill&& fill) {
     case SampleType::int16: samples = std::vector<std::int16_t>(count); break;
     case SampleType::uint8: samples = std::vector<std::uint8_t>(count); break;
   }
-  Status filled = std::visit(
-      [&](auto& values) -> Status {
-        ASPERITY_CHECK(fill(reinterpret_cast<char*>(values.data()), values.size() * sizeof(values[0])));
-        static_assert(std::endian::native == std::endian::little);
-        if (sidecar.big_endian) swap_bytes(values);
-        return success();
-      },
-      samples);
-  if (!filled) return std::move(filled).error();
+  const auto filled = [&](auto& values) -> Status {
+    ASPERITY_CHECK(fill(reinterpret_cast<char*>(values.data()), values.size() * sizeof(values[0])));
+    static_assert(std::endian::native == std::endian::little);
+    if (sidecar.big_endian) swap_bytes(values);
+    return success();
+  };
+  ASPERITY_CHECK(std::visit(filled, samples));
   return samples;
 }
 
@@ -236,19 +219,15 @@ Result<VolumeSource> finish(Sidecar sidecar, const VolumeRequest& request) {
 Result<VolumeSource> read_sidecar_volume(std::string_view text, std::string_view samples, const std::string& name,
                                          const VolumeRequest& request) {
   try {
-    Result<VolumeSource> source = [&]() -> Result<VolumeSource> {
-      ASPERITY_TRY(Sidecar sidecar, read_description(text, name, request));
-      ASPERITY_CHECK(check_length(sidecar, samples.size(), sidecar.file));
-      ASPERITY_TRY(sidecar.raw.samples, load_samples(sidecar, [&](char* to, std::size_t bytes) {
-                     std::memcpy(to, samples.data(), bytes);
-                     return success();
-                   }));
-      return finish(std::move(sidecar), request);
-    }();
-    if (!source) return std::move(source).error().in_file(name);
-    return source;
+    ASPERITY_TRY(Sidecar sidecar, in_file(read_description(text, name, request), name));
+    ASPERITY_CHECK(in_file(check_length(sidecar, samples.size(), sidecar.file), name));
+    ASPERITY_TRY(sidecar.raw.samples, load_samples(sidecar, [&](char* to, std::size_t bytes) {
+                   std::memcpy(to, samples.data(), bytes);
+                   return success();
+                 }));
+    return in_file(finish(std::move(sidecar), request), name);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", name, {}, "a smaller volume"};
+    return refused_file(ErrorCode::too_large, "needs more memory than there is", name, "a smaller volume");
   }
 }
 
@@ -258,15 +237,13 @@ Result<VolumeSource> read_sidecar_volume(const fs::path& path, const VolumeReque
   const std::uintmax_t length = fs::file_size(path, problem);
   std::ifstream stream(path, std::ios::binary);
   if (problem || !stream)
-    return Error{ErrorCode::file_missing, "cannot be read", path.string(), {}, "a volume's sidecar (JSON)"};
-  if (length > largest_sidecar)
-    return Error{
-        ErrorCode::too_large, fmt::format("has {} bytes", length), path.string(), {}, "a sidecar of at most 16 MiB"};
+    return refused_file(ErrorCode::file_missing, "cannot be read", path.string(), "a volume's sidecar (JSON)");
+  if (length > largest_sidecar) {
+    return refused_file(ErrorCode::too_large, fmt::format("has {} bytes", length), path.string(),
+                        "a sidecar of at most 16 MiB");
+  }
   const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  Result<Sidecar> described = read_description(text, path.string(), request);
-  if (!described) return std::move(described).error().in_file(path.string());
-  Sidecar sidecar = std::move(*described);
-
+  ASPERITY_TRY(Sidecar sidecar, in_file(read_description(text, path.string(), request), path.string()));
   const fs::path raw = path.parent_path() / fs::path(sidecar.file);
   const std::uintmax_t held = fs::file_size(raw, problem);
   std::ifstream data(raw, std::ios::binary);
@@ -282,9 +259,7 @@ Result<VolumeSource> read_sidecar_volume(const fs::path& path, const VolumeReque
                  return Error{ErrorCode::file_truncated, "cannot be read to its end", raw.string(),
                               fmt::format("byte {}", data.gcount()), "a readable file"};
                }));
-  Result<VolumeSource> source = finish(std::move(sidecar), request);
-  if (!source) return std::move(source).error().in_file(raw.string());
-  return source;
+  return in_file(finish(std::move(sidecar), request), raw.string());
 }
 
 }  // namespace asperity

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 
 #include "asperity/io/detail/mesh_readers.h"
@@ -91,16 +93,10 @@ constexpr Key buffers_key[] = {{"buffers", Kind::objects, false, nullptr, 0, buf
 constexpr const char* material_keys[] = {"meshes", "materials", "textures", "samplers", "images", "extensions"};
 
 bool is_root_key(std::string_view name, GltfParts parts) {
-  for (const char* key : material_keys) {
-    if (parts == GltfParts::geometry_and_materials && name == key) return true;
-  }
-  for (const char* kept : {"asset", "extensionsUsed", "extensionsRequired", "buffers", "skins", "animations"}) {
-    if (name == kept) return true;
-  }
-  for (const Key& key : root_keys) {
-    if (name == key.name) return true;
-  }
-  return false;
+  const auto among = [&](const auto& keys) { return std::ranges::find(keys, name) != std::end(keys); };
+  constexpr const char* kept[] = {"asset", "extensionsUsed", "extensionsRequired", "buffers", "skins", "animations"};
+  return among(kept) || (parts == GltfParts::geometry_and_materials && among(material_keys)) ||
+         std::ranges::find(root_keys, name, &Key::name) != std::end(root_keys);
 }
 
 /// Copies the keys of a table out of the file's JSON and refuses values of another type.
@@ -210,11 +206,10 @@ std::vector<std::string> words(const Json& root, const char* key) {
 
 /// Extensions that say how something looks, not where it is.
 bool leaves_geometry_alone(std::string_view extension) {
-  for (const char* start : {"KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_", "EXT_lights_",
-                            "MSFT_texture_", "MSFT_packing_", "ADOBE_materials_"}) {
-    if (extension.starts_with(start)) return true;
-  }
-  return false;
+  constexpr const char* starts[] = {"KHR_materials_", "KHR_texture_",  "KHR_lights_",
+                                    "KHR_xmp",        "EXT_texture_",  "EXT_lights_",
+                                    "MSFT_texture_",  "MSFT_packing_", "ADOBE_materials_"};
+  return std::ranges::any_of(starts, [&](const char* start) { return extension.starts_with(start); });
 }
 
 Status check_version(const Json& root) {
@@ -232,8 +227,8 @@ Status check_version(const Json& root) {
     // A later 2.x may be read as 2.0 unless the file says otherwise by minVersion.
     const bool good = std::string_view(key) == "version" ? text.starts_with("2.") : text == "2.0";
     if (good) continue;
-    return Error{
-        ErrorCode::file_unsupported, fmt::format("is \"{}\"", text.substr(0, 20)), {}, place, accepted_container};
+    return refused(ErrorCode::file_unsupported, fmt::format("is \"{}\"", text.substr(0, 20)), place,
+                   accepted_container);
   }
   return success();
 }
@@ -301,7 +296,8 @@ bool has_scheme(std::string_view uri) {
   return uri.substr(0, colon).find_first_of("/?#") == std::string_view::npos;
 }
 
-/// Decodes until `length` bytes are there; false at a character that base64 does not have.
+}  // namespace
+
 bool decode_base64(std::string_view text, std::size_t length, std::string& bytes) {
   std::array<std::int8_t, 256> value{};
   value.fill(-1);
@@ -325,18 +321,24 @@ bool decode_base64(std::string_view text, std::size_t length, std::string& bytes
   return true;
 }
 
+namespace {
+
+/// What stands behind "data:...;base64,"; nothing where `uri` is no such thing.
+std::optional<std::string_view> base64_of(std::string_view uri) {
+  const std::size_t comma = uri.find(',');
+  if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) return std::nullopt;
+  return uri.substr(comma + 1);
+}
+
 Error too_short(std::size_t wanted, std::string_view what, std::uint64_t has, const std::string& place) {
-  return {ErrorCode::file_truncated,
-          fmt::format("promises {} bytes and {} has {}", wanted, what, has),
-          {},
-          place,
-          "a complete file"};
+  return refused(ErrorCode::file_truncated, fmt::format("promises {} bytes and {} has {}", wanted, what, has), place,
+                 "a complete file");
 }
 
 }  // namespace
 
 Error malformed(std::string what, std::string place, std::string accepted) {
-  return {ErrorCode::file_malformed, std::move(what), {}, std::move(place), std::move(accepted)};
+  return refused(ErrorCode::file_malformed, std::move(what), std::move(place), std::move(accepted));
 }
 
 Status GltfDocument::read_container(std::string_view bytes) {
@@ -447,7 +449,7 @@ Result<std::filesystem::path> GltfDocument::resolve(const std::string& uri, cons
   const std::string name = without_percents(uri);
   const std::string shown = name.substr(0, 200);
   const auto error = [&](ErrorCode code, std::string what) {
-    return Error{code, std::move(what), {}, place, "a file path relative to the .gltf file, or a data URI"};
+    return refused(code, std::move(what), place, "a file path relative to the .gltf file, or a data URI");
   };
   if (has_scheme(uri) || name.empty() || name.front() == '/' || name.front() == '\\' ||
       name.find('\0') != std::string::npos) {
@@ -491,14 +493,10 @@ Status GltfDocument::read_external(Buffer& buffer, const std::string& place) con
 
 Result<std::string> GltfDocument::resource(const std::string& uri, const std::string& place) const {
   if (uri.starts_with("data:")) {
-    const std::string_view text = uri;
-    const std::size_t comma = std::min(text.find(','), text.size());
+    const std::optional<std::string_view> text = base64_of(uri);
     std::string bytes;
-    if (comma == text.size() || !text.substr(0, comma).ends_with(";base64") ||
-        !decode_base64(text.substr(comma + 1), std::string::npos / 2, bytes)) {
-      return malformed("is no data URI of base64", place, "data:image/png;base64,...");
-    }
-    return bytes;
+    if (text && decode_base64(*text, std::string::npos / 2, bytes)) return bytes;
+    return malformed("is no data URI of base64", place, "data:image/png;base64,...");
   }
   ASPERITY_TRY(const std::filesystem::path path, resolve(uri, place));
   std::error_code problem;
@@ -513,18 +511,16 @@ Result<std::string> GltfDocument::resource(const std::string& uri, const std::st
 Result<std::string_view> GltfDocument::view(std::size_t index) {
   const std::string place = fmt::format("bufferViews[{}]", index);
   if (index >= views_.size()) {
-    return Error{
-        ErrorCode::bad_mesh, fmt::format("is one of {}", views_.size()), {}, place, "indices of things that are there"};
+    return refused(ErrorCode::bad_mesh, fmt::format("is one of {}", views_.size()), place,
+                   "indices of things that are there");
   }
   const View& one = views_[index];
   ASPERITY_TRY(const std::string_view bytes, buffer(one.buffer));
   if (one.offset > bytes.size() || one.length > bytes.size() - one.offset) {
-    return Error{
+    return refused(
         ErrorCode::bad_mesh,
         fmt::format("reaches from byte {} over {} bytes in a buffer of {}", one.offset, one.length, bytes.size()),
-        {},
-        place,
-        "views that lie within their buffer"};
+        place, "views that lie within their buffer");
   }
   return bytes.substr(one.offset, one.length);
 }
@@ -546,15 +542,11 @@ Result<std::string_view> GltfDocument::buffer(std::size_t index) {
     ASPERITY_CHECK(read_external(buffer, place));
     return std::string_view(*buffer.bytes);
   }
-  const std::string_view uri = buffer.uri;
-  const std::size_t comma = std::min(uri.find(','), uri.size());
-  if (comma == uri.size() || !uri.substr(0, comma).ends_with(";base64")) {
-    return malformed("is a data URI without base64", place + ".uri", "data:application/octet-stream;base64,...");
-  }
+  constexpr const char* accepted = "data:application/octet-stream;base64,...";
+  const std::optional<std::string_view> text = base64_of(buffer.uri);
+  if (!text) return malformed("is a data URI without base64", place + ".uri", accepted);
   auto bytes = std::make_unique<std::string>();
-  if (!decode_base64(uri.substr(comma + 1), buffer.length, *bytes)) {
-    return malformed("is not base64", place + ".uri", "data:application/octet-stream;base64,...");
-  }
+  if (!decode_base64(*text, buffer.length, *bytes)) return malformed("is not base64", place + ".uri", accepted);
   if (bytes->size() < buffer.length) return too_short(buffer.length, "its data URI", bytes->size(), place);
   buffer.bytes = std::move(bytes);
   return std::string_view(*buffer.bytes);

@@ -31,6 +31,9 @@ bool parse_number(std::string_view token, double& value);
 /// Reads a decimal integer that makes up the whole token.
 bool parse_integer(std::string_view token, std::int64_t& value);
 
+/// Decodes base64 until `length` bytes are there, or the text ends; false at a character that base64 does not have.
+bool decode_base64(std::string_view text, std::size_t length, std::string& bytes);
+
 /// Reads a little-endian 32-bit pattern; `at` + 4 must lie within `bytes`.
 inline std::uint32_t bits_at(std::string_view bytes, std::size_t at) {
   std::uint32_t bits = 0;
@@ -41,6 +44,9 @@ inline std::uint32_t bits_at(std::string_view bytes, std::size_t at) {
 inline bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
 }
+
+/// Whether two words are the same, large and small letters alike.
+bool same_word(std::string_view a, std::string_view b);
 
 /// Takes the next word off the front of `line`; empty at its end.
 std::string_view take_word(std::string_view& line);

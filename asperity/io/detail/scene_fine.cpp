@@ -294,24 +294,18 @@ class TextureReader {
     const SceneJson* features = reader_.raw("features");
     const char* accepted = "a feature, or an array of them";
     if (features == nullptr) return success();
-    if (features->is_object()) {
-      SceneJson canonical;
-      ASPERITY_CHECK(read_feature(*features, reader_.place_of("features"), canonical));
-      reader_.write("features", SceneJson::array({std::move(canonical)}));
-      return success();
-    }
-    if (!features->is_array()) {
+    const bool one = features->is_object();
+    if (!one && !features->is_array()) {
       reader_.fail_type("features", *features, accepted);
-    } else if (features->empty() || features->size() > FineFeatures::most_features) {
+    } else if (!one && (features->empty() || features->size() > FineFeatures::most_features)) {
       reader_.fail("features", fmt::format("has {} features", features->size()),
                    fmt::format("1 to {} of them", FineFeatures::most_features));
     }
     ASPERITY_CHECK(reader_.status());
     SceneJson canonical = SceneJson::array();
-    for (std::size_t i = 0; i < features->size(); ++i) {
-      SceneJson one;
-      ASPERITY_CHECK(read_feature((*features)[i], reader_.place_of("features", i), one));
-      canonical.push_back(std::move(one));
+    for (std::size_t i = 0; i < (one ? 1 : features->size()); ++i) {
+      const std::string place = one ? reader_.place_of("features") : reader_.place_of("features", i);
+      ASPERITY_CHECK(read_feature(one ? *features : (*features)[i], place, canonical.emplace_back()));
     }
     reader_.write("features", std::move(canonical));
     return success();
@@ -368,17 +362,11 @@ class TextureReader {
   }
 
   void note_scale(const SurfaceFeature& feature, FeatureScale own, FeatureScale scale) {
-    std::string why;
-    switch (own) {
-      case FeatureScale::friction:
-        why = fmt::format("finer than {} is friction", format_length(scales_.friction_below));
-        break;
-      case FeatureScale::texture:
-        why = fmt::format("{} to {} is texture", format_length(scales_.friction_below),
-                          format_length(scales_.shape_from));
-        break;
-      case FeatureScale::shape: why = fmt::format("{} and more is shape", format_length(scales_.shape_from)); break;
-    }
+    const std::string below = format_length(scales_.friction_below);
+    const std::string from = format_length(scales_.shape_from);
+    const std::string why = own == FeatureScale::friction  ? fmt::format("finer than {} is friction", below)
+                            : own == FeatureScale::texture ? fmt::format("{} to {} is texture", below, from)
+                                                           : fmt::format("{} and more is shape", from);
     context_.note(fmt::format("surface \"{}\": {} of {} is felt as {}{} ({})", host_.name,
                               feature_name(feature.spec().kind), format_length(feature.wavelength()), scale_name(scale),
                               own == scale ? "" : ", as the scene asks", why));

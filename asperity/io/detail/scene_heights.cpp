@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -160,10 +159,7 @@ Status HeightSourceReader::read_floats() {
 Status HeightSourceReader::read_image_source(const std::string& file) {
   path_ = context_.resolve(file);
   if (context_.progress) context_.progress("reading height map", 0.0);
-  std::string extension = path_.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".exr") return read_floats();
+  if (lower_extension(path_) == ".exr") return read_floats();
   ASPERITY_TRY(image_, in_file(read_image(path_), path_.string(), reader_.place_of(key_)));
   reader_.write(key_, path_.string());
   channel_ = reader_.choice("channel", Channel::automatic);

@@ -15,7 +15,7 @@
 #include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/units.h"
-#include "asperity/io/detail/placed.h"
+#include "asperity/io/detail/file_reading.h"
 
 namespace asperity {
 
@@ -103,6 +103,8 @@ class ObjectReader {
   Vec3 vector(std::string_view key, Dimension dimension, const Vec3& fallback, double most);
   /// Three plain numbers, not all 0.
   Vec3 direction(std::string_view key, const Vec3& fallback);
+  /// The number that `value` is, which stands at `place`: SI, or a text with a unit.
+  double value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range);
   /// The value as it stands, or nullptr.
   [[nodiscard]] const SceneJson* raw(std::string_view key) const;
 
@@ -146,7 +148,6 @@ class ObjectReader {
     names.insert(names.begin(), "auto");
     return names;
   }
-  double value_of(const SceneJson& value, const std::string& place, Dimension dimension, const Range& range);
   /// The numbers of an array, written under `key`.
   template <class Vector>
   Vector values_of(const SceneJson& values, std::string_view key, Dimension dimension, const Range& range);

@@ -16,8 +16,7 @@ constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 using Counts = std::array<std::size_t, 3>;
 
 Error at_axis(std::size_t axis, std::string what, std::string accepted) {
-  return Error{
-      ErrorCode::bad_value, std::move(what), {}, fmt::format("axis {}", axis_names[axis]), std::move(accepted)};
+  return bad_value(std::move(what), fmt::format("axis {}", axis_names[axis]), std::move(accepted));
 }
 
 /// Turns an axis that descends; answers whether it did.
@@ -74,12 +73,10 @@ Result<std::size_t> count_unknown(const SampleArray& samples, const Counts& coun
       const float value = (*floats)[at + c];
       if (std::isinf(value)) {
         const std::size_t i = at / components;
-        return Error{
-            ErrorCode::bad_value,
+        return bad_value(
             "is infinite",
-            {},
             fmt::format("sample [{}, {}, {}]", i % counts[0], i / counts[0] % counts[1], i / (counts[0] * counts[1])),
-            "finite samples, or NaN where nothing is known"};
+            "finite samples, or NaN where nothing is known");
       }
       known = known && !std::isnan(value);
     }

@@ -57,11 +57,9 @@ class Cursor {
 
  private:
   [[nodiscard]] Error truncated(std::uint64_t count) const {
-    return Error{end_ == bytes_.size() ? ErrorCode::file_truncated : ErrorCode::file_malformed,
-                 fmt::format("declares {} bytes where {} are left", count, left()),
-                 {},
-                 fmt::format("byte {}", at_),
-                 "the whole file, as it was written"};
+    return refused(end_ == bytes_.size() ? ErrorCode::file_truncated : ErrorCode::file_malformed,
+                   fmt::format("declares {} bytes where {} are left", count, left()), fmt::format("byte {}", at_),
+                   "the whole file, as it was written");
   }
 
   std::string_view bytes_;
@@ -263,35 +261,31 @@ class TreeWalk {
     return success();
   }
 
-  template <std::size_t Bits>
-  Result<std::pair<MaskView<Bits>, MaskView<Bits>>> masks() {
-    ASPERITY_TRY(const std::string_view child, cursor_.take(Bits / 8));
-    ASPERITY_TRY(const std::string_view value, cursor_.take(Bits / 8));
-    std::pair<MaskView<Bits>, MaskView<Bits>> out{MaskView<Bits>(child), MaskView<Bits>(value)};
-    if (out.first.meets(out.second))
-      return cursor_.malformed("has a child and an active value at one place", "one of them");
-    return out;
+  /// The masks and values of an inner node, its active tiles of so many blocks each. Answers how many children it has.
+  template <std::size_t Side>
+  Result<std::size_t> inner(std::uint64_t blocks_a_tile) {
+    constexpr std::size_t bits = Side * Side * Side;
+    ASPERITY_TRY(const std::string_view child, cursor_.take(bits / 8));
+    ASPERITY_TRY(const std::string_view value, cursor_.take(bits / 8));
+    const MaskView<bits> children(child);
+    const MaskView<bits> active(value);
+    if (children.meets(active)) return cursor_.malformed("has a child and an active value at one place", "one of them");
+    size_.tiles += active.count() * blocks_a_tile;
+    ASPERITY_CHECK(values(bits, active.count()));
+    return children.count();
   }
 
   Status inner_5() {
-    constexpr std::size_t bits = 32 * 32 * 32;
     ++size_.nodes_5;
-    ASPERITY_TRY(const auto mask, masks<bits>());
-    const std::size_t active = mask.second.count();
-    size_.tiles += std::uint64_t{active} * 16 * 16 * 16;
-    ASPERITY_CHECK(values(bits, active));
-    for (std::size_t n = 0, children = mask.first.count(); n < children; ++n) ASPERITY_CHECK(inner_4());
+    ASPERITY_TRY(const std::size_t children, inner<32>(16 * 16 * 16));
+    for (std::size_t n = 0; n < children; ++n) ASPERITY_CHECK(inner_4());
     return success();
   }
 
   Status inner_4() {
-    constexpr std::size_t bits = 16 * 16 * 16;
     ++size_.nodes_4;
-    ASPERITY_TRY(const auto mask, masks<bits>());
-    const std::size_t active = mask.second.count();
-    size_.tiles += active;
-    ASPERITY_CHECK(values(bits, active));
-    for (std::size_t n = 0, children = mask.first.count(); n < children; ++n) {
+    ASPERITY_TRY(const std::size_t children, inner<16>(1));
+    for (std::size_t n = 0; n < children; ++n) {
       leaves_.push_back(cursor_.at());
       ASPERITY_CHECK(cursor_.skip(512 / 8));
       ++size_.leaves;
@@ -335,9 +329,11 @@ class TreeWalk {
   std::vector<std::size_t> leaves_;  ///< bytes of their masks
 };
 
-Error at_grid(Error error, const GridOutline& grid) {
-  error.place = fmt::format("grid \"{}\", {}", shown(grid.name), error.place);
-  return error;
+/// The result, its error with the grid before the place.
+template <class T>
+Result<T> at_grid(Result<T> result, const GridOutline& grid) {
+  if (!result) result.error().place = fmt::format("grid \"{}\", {}", shown(grid.name), result.error().place);
+  return result;
 }
 
 Result<std::size_t> read_header(Cursor& cursor) {
@@ -413,7 +409,7 @@ Result<std::vector<GridOutline>> outline(std::string_view bytes) {
       grid.tree_at = inner.at();
       return success();
     };
-    if (Status status = read(); !status) return at_grid(std::move(status).error(), grid);
+    ASPERITY_CHECK(at_grid(read(), grid));
     cursor = Cursor(bytes, grid.end, bytes.size());
     grids.push_back(std::move(grid));
   }
@@ -421,9 +417,7 @@ Result<std::vector<GridOutline>> outline(std::string_view bytes) {
 }
 
 Result<TreeSize> check_tree(std::string_view bytes, const GridOutline& grid, std::size_t value_bytes, bool real) {
-  Result<TreeSize> size = TreeWalk(bytes, grid, value_bytes, real).run();
-  if (!size) return at_grid(std::move(size).error(), grid);
-  return size;
+  return at_grid(TreeWalk(bytes, grid, value_bytes, real).run(), grid);
 }
 
 }  // namespace asperity::vdb_io

@@ -64,7 +64,7 @@ std::string listed(const std::vector<GridOutline>& grids) {
 }
 
 Error in_grid(ErrorCode code, const GridOutline& grid, std::string what, std::string accepted) {
-  return Error{code, std::move(what), {}, fmt::format("grid \"{}\"", shown(grid.name)), std::move(accepted)};
+  return refused(code, std::move(what), fmt::format("grid \"{}\"", shown(grid.name)), std::move(accepted));
 }
 
 /// The grid that is wanted.
@@ -170,8 +170,7 @@ class Reader {
     const std::uint64_t needed =
         (size.leaves + size.tiles) * leaf_bytes + size.nodes_5 * 300'000 + size.nodes_4 * 40'000;
     if (needed > request_.most_bytes) {
-      return refused(ErrorCode::too_large, fmt::format("would take {} MiB", needed >> 20U),
-                     fmt::format("grid \"{}\"", shown(grid.name)),
+      return in_grid(ErrorCode::too_large, grid, fmt::format("would take {} MiB", needed >> 20U),
                      fmt::format("at most {} MiB", request_.most_bytes >> 20U));
     }
     const auto loaded =
@@ -248,9 +247,9 @@ class Reader {
     // Most files are mostly empty; this one is nothing else.
     const double most = std::min(static_cast<double>(request_.most_bytes), 2147483648.0);
     if (bytes <= most) return success();
-    return refused(ErrorCode::too_large,
+    return in_grid(ErrorCode::too_large, outline,
                    fmt::format("spreads its voxels over a box of {:.3g} blocks", bytes / entry_bytes),
-                   fmt::format("grid \"{}\"", shown(outline.name)), fmt::format("at most {:.3g}", most / entry_bytes));
+                   fmt::format("at most {:.3g}", most / entry_bytes));
   }
 
   /// Faces and materials that lie on the same points. Answers whether it was one.
@@ -350,17 +349,12 @@ class MemoryArchive : public openvdb::io::Archive {
   }
 };
 
-template <class Leaf>
-openvdb::Index offset_of(int i, int j, int k) {
-  return Leaf::coordToOffset(openvdb::Coord(i, j, k));
-}
-
 template <class Visit>
 void for_each_point(const Visit& visit) {
   for (int k = 0; k < SparseBlock::side; ++k) {
     for (int j = 0; j < SparseBlock::side; ++j) {
       for (int i = 0; i < SparseBlock::side; ++i)
-        visit(SparseBlock::index(i, j, k), offset_of<openvdb::FloatTree::LeafNodeType>(i, j, k));
+        visit(SparseBlock::index(i, j, k), openvdb::FloatTree::LeafNodeType::coordToOffset(openvdb::Coord(i, j, k)));
     }
   }
 }

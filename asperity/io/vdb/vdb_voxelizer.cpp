@@ -73,8 +73,8 @@ Result<std::vector<VoxelBlock>> voxelize(const VoxelRequest& request, const Prog
   } catch (const std::bad_alloc&) {
     return refused(ErrorCode::too_large, "takes more memory than there is", "voxel", "a larger voxel");
   } catch (const std::exception& failure) {
-    return Error{
-        ErrorCode::bad_mesh, std::string("cannot be converted: ") + failure.what(), {}, {}, "a mesh of triangles"};
+    return refused(ErrorCode::bad_mesh, std::string("cannot be converted: ") + failure.what(), {},
+                   "a mesh of triangles");
   }
 }
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/vtk_data.h"
 
@@ -25,7 +26,7 @@ Status check_list(const fs::path& file, std::size_t most_bytes) {
     fs::path packed = file;
     packed += ".gz";
     if (fs::exists(packed, ignored)) return success();
-    return Error{ErrorCode::file_missing, "no such file", file.string(), {}, "a whole OpenFOAM case"};
+    return refused_file(ErrorCode::file_missing, "no such file", file.string(), "a whole OpenFOAM case");
   }
   ASPERITY_TRY(const std::string text, file_bytes(file, most_bytes));
   mesh_readers::TextCursor cursor(text);
@@ -38,7 +39,7 @@ Status check_list(const fs::path& file, std::size_t most_bytes) {
     return Error{ErrorCode::file_malformed, fmt::format("declares {} entries in {} bytes", count, text.size()),
                  file.string(), cursor.place(), "no more than the file can hold"};
   }
-  return Error{ErrorCode::file_truncated, "states no number of entries", file.string(), {}, "an OpenFOAM list"};
+  return refused_file(ErrorCode::file_truncated, "states no number of entries", file.string(), "an OpenFOAM list");
 }
 
 Result<double> choose_step(vtkOpenFOAMReader& reader, const std::string& wanted) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
@@ -14,12 +15,7 @@ namespace {
 
 constexpr std::uint64_t most_along_axis = 1U << 24U;
 
-bool same_word(std::string_view a, std::string_view b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](char x, char y) {
-           const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-           return lower(x) == lower(y);
-         });
-}
+using mesh_readers::same_word;
 
 class LegacyFile {
  public:
@@ -51,7 +47,7 @@ class LegacyFile {
     return fmt::format("line {}", 1 + std::count(before.begin(), before.end(), '\n'));
   }
   [[nodiscard]] Error bad(std::string what, std::string accepted, ErrorCode code = ErrorCode::file_malformed) const {
-    return Error{code, std::move(what), {}, place(), std::move(accepted)};
+    return refused(code, std::move(what), place(), std::move(accepted));
   }
   [[nodiscard]] Error ends() const {
     return refused(ErrorCode::file_truncated, "ends before what it declares", fmt::format("byte {}", bytes_.size()),
@@ -335,21 +331,11 @@ class LegacyFile {
 }  // namespace
 
 std::size_t legacy_type_bytes(std::string_view type) {
-  static constexpr std::array<std::pair<const char*, std::size_t>, 15> types{{{"bit", 1},
-                                                                              {"char", 1},
-                                                                              {"signed_char", 1},
-                                                                              {"unsigned_char", 1},
-                                                                              {"short", 2},
-                                                                              {"unsigned_short", 2},
-                                                                              {"int", 4},
-                                                                              {"unsigned_int", 4},
-                                                                              {"vtkidtype", 4},
-                                                                              {"float", 4},
-                                                                              {"double", 8},
-                                                                              {"long", 8},
-                                                                              {"unsigned_long", 8},
-                                                                              {"vtktypeint64", 8},
-                                                                              {"vtktypeuint64", 8}}};
+  static const std::map<std::string_view, std::size_t> types{
+      {"bit", 1},           {"char", 1},           {"signed_char", 1},  {"unsigned_char", 1},
+      {"short", 2},         {"unsigned_short", 2}, {"int", 4},          {"unsigned_int", 4},
+      {"vtkidtype", 4},     {"float", 4},          {"double", 8},       {"long", 8},
+      {"unsigned_long", 8}, {"vtktypeint64", 8},   {"vtktypeuint64", 8}};
   for (const auto& [name, bytes] : types) {
     if (same_word(type, name)) return bytes;
   }

@@ -19,8 +19,7 @@ Status check_detached(const std::filesystem::path& header, const std::string& na
   const std::filesystem::path data = header.parent_path() / name;
   std::error_code problem;
   if (name.find('%') != std::string::npos || name.starts_with("LIST")) {
-    return Error{
-        ErrorCode::file_unsupported, "its samples are in several files", {}, "data file", "one file of samples"};
+    return refused(ErrorCode::file_unsupported, "its samples are in several files", "data file", "one file of samples");
   }
   if (!std::filesystem::is_regular_file(data, problem)) {
     return refused(ErrorCode::file_missing, fmt::format("the file of samples, \"{}\", cannot be read", name),

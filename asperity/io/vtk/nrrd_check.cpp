@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
@@ -20,47 +22,45 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::size_t nrrd_type_bytes(std::string_view type) {
-  static constexpr std::array<std::pair<std::string_view, std::size_t>, 28> types{
-      {{"signed char", 1},  {"int8", 1},       {"int8_t", 1},   {"uchar", 1},          {"unsigned char", 1},
-       {"uint8", 1},        {"uint8_t", 1},    {"short", 2},    {"short int", 2},      {"int16", 2},
-       {"int16_t", 2},      {"ushort", 2},     {"uint16", 2},   {"unsigned short", 2}, {"uint16_t", 2},
-       {"int", 4},          {"signed int", 4}, {"int32", 4},    {"int32_t", 4},        {"uint", 4},
-       {"unsigned int", 4}, {"uint32", 4},     {"uint32_t", 4}, {"int64", 8},          {"uint64", 8},
-       {"long long", 8},    {"float", 4},      {"double", 8}}};
-  for (const auto& [name, bytes] : types) {
-    if (type == name) return bytes;
-  }
-  return 0;
+  static const std::map<std::string_view, std::size_t> bytes{
+      {"signed char", 1},  {"int8", 1},       {"int8_t", 1},   {"uchar", 1},          {"unsigned char", 1},
+      {"uint8", 1},        {"uint8_t", 1},    {"short", 2},    {"short int", 2},      {"int16", 2},
+      {"int16_t", 2},      {"ushort", 2},     {"uint16", 2},   {"unsigned short", 2}, {"uint16_t", 2},
+      {"int", 4},          {"signed int", 4}, {"int32", 4},    {"int32_t", 4},        {"uint", 4},
+      {"unsigned int", 4}, {"uint32", 4},     {"uint32_t", 4}, {"int64", 8},          {"uint64", 8},
+      {"long long", 8},    {"float", 4},      {"double", 8}};
+  const auto found = bytes.find(type);
+  return found == bytes.end() ? 0 : found->second;
 }
 
 /// Fields that say nothing of what is read here.
 bool is_other_field(std::string_view key) {
-  static constexpr std::array<std::string_view, 25> fields{"content",
-                                                           "centers",
-                                                           "centerings",
-                                                           "block size",
-                                                           "blocksize",
-                                                           "min",
-                                                           "max",
-                                                           "old min",
-                                                           "oldmin",
-                                                           "old max",
-                                                           "oldmax",
-                                                           "number",
-                                                           "thicknesses",
-                                                           "axis maxs",
-                                                           "axismaxs",
-                                                           "labels",
-                                                           "units",
-                                                           "space",
-                                                           "space dimension",
-                                                           "space units",
-                                                           "sample units",
-                                                           "sampleunits",
-                                                           "measurement frame",
-                                                           "axis units",
-                                                           "measurementframe"};
-  return std::find(fields.begin(), fields.end(), key) != fields.end();
+  static const std::set<std::string_view> fields{"content",
+                                                 "centers",
+                                                 "centerings",
+                                                 "block size",
+                                                 "blocksize",
+                                                 "min",
+                                                 "max",
+                                                 "old min",
+                                                 "oldmin",
+                                                 "old max",
+                                                 "oldmax",
+                                                 "number",
+                                                 "thicknesses",
+                                                 "axis maxs",
+                                                 "axismaxs",
+                                                 "labels",
+                                                 "units",
+                                                 "space",
+                                                 "space dimension",
+                                                 "space units",
+                                                 "sample units",
+                                                 "sampleunits",
+                                                 "measurement frame",
+                                                 "axis units",
+                                                 "measurementframe"};
+  return fields.contains(key);
 }
 
 class NrrdFile {
@@ -97,7 +97,7 @@ class NrrdFile {
 
  private:
   [[nodiscard]] Error bad(std::string what, std::string accepted, ErrorCode code = ErrorCode::file_malformed) const {
-    return Error{code, std::move(what), {}, cursor_.place(), std::move(accepted)};
+    return refused(code, std::move(what), cursor_.place(), std::move(accepted));
   }
 
   Status field(const std::string& key, std::string_view value) {
@@ -157,14 +157,11 @@ class NrrdFile {
   }
 
   Status spacings(std::string_view value) {
-    std::vector<double> read;
+    spacings_.clear();
     for (std::string_view word = mesh_readers::take_word(value); !word.empty(); word = mesh_readers::take_word(value)) {
-      double number = 0.0;
-      if (!mesh_readers::parse_number(word, number))
+      if (!mesh_readers::parse_number(word, spacings_.emplace_back()))
         return bad(fmt::format("spacings has \"{}\"", word.substr(0, 40)), "numbers above 0", ErrorCode::bad_value);
-      read.push_back(number);
     }
-    spacings_ = std::move(read);
     return success();
   }
 
@@ -287,11 +284,9 @@ class NrrdFile {
     header_.data_bytes = count * bytes_each_;
     if (!detached_.empty()) return success();
     const std::uint64_t held = bytes_.size() - std::min(bytes_.size(), cursor_.offset());
-    const bool packed = encoding_.starts_with("gz");
-    const std::uint64_t declared = count * bytes_each_;
-    const std::uint64_t can_hold = packed ? held * 1100 : held;
-    if (declared <= can_hold) return success();
-    return refused(ErrorCode::file_truncated, fmt::format("declares {} bytes of samples, {} are there", declared, held),
+    if (header_.data_bytes <= (header_.packed ? held * 1100 : held)) return success();
+    return refused(ErrorCode::file_truncated,
+                   fmt::format("declares {} bytes of samples, {} are there", header_.data_bytes, held),
                    fmt::format("byte {}", bytes_.size()), "a whole file");
   }
 

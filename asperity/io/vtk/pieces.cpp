@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/vtk/vtk_data.h"
 #include "asperity/io/vtk/xml_scan.h"
 
@@ -133,12 +134,13 @@ class Assembly {
       const auto cells = static_cast<std::size_t>(partition_.whole[2 * a + 1] - partition_.whole[2 * a]);
       size[a] = counts_[a] = of_cells() ? cells : cells + 1;
     }
-    Result<std::size_t> count = volume_assembly::sample_count(size, components * sizeof(float), request_.most_bytes);
-    if (!count) return std::move(count).error().at("WholeExtent");
+    ASPERITY_TRY(
+        const std::size_t count,
+        at_place(volume_assembly::sample_count(size, components * sizeof(float), request_.most_bytes), "WholeExtent"));
     place_nodes();
-    covered_.assign(*count, false);
+    covered_.assign(count, false);
     raw_.samples = std::visit(
-        [&](const auto& samples) { return SampleArray(std::decay_t<decltype(samples)>(*count * components)); }, first);
+        [&](const auto& samples) { return SampleArray(std::decay_t<decltype(samples)>(count * components)); }, first);
     return success();
   }
 
@@ -162,16 +164,16 @@ class Assembly {
     wanted.array = described_.name;
     wanted.association = described_.association;
     std::vector<std::string> notes;
-    Result<std::size_t> chosen = volume_assembly::choose_array(found.described, wanted, notes);
-    if (!chosen) return std::move(chosen).error().at(piece.place);
-    if (found.described[*chosen].components != described_.components)
-      return refused(ErrorCode::mismatch, fmt::format("\"{}\" has other components", piece.source), piece.place,
+    ASPERITY_TRY(const std::size_t chosen,
+                 at_place(volume_assembly::choose_array(found.described, wanted, notes), piece.place));
+    const auto other = [&](const char* what) {
+      return refused(ErrorCode::mismatch, fmt::format("\"{}\" has other {}", piece.source, what), piece.place,
                      "the same arrays in every piece");
+    };
+    if (found.described[chosen].components != described_.components) return other("components");
     std::vector<std::string> lost;
-    const SampleArray samples = samples_of(*found.arrays[*chosen], lost);
-    if (samples.index() != raw_.samples.index())
-      return refused(ErrorCode::mismatch, fmt::format("\"{}\" has other types", piece.source), piece.place,
-                     "the same arrays in every piece");
+    const SampleArray samples = samples_of(*found.arrays[chosen], lost);
+    if (samples.index() != raw_.samples.index()) return other("types");
     for (std::string& note : lost) {
       if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) notes_.push_back(std::move(note));
     }

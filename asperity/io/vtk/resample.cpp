@@ -285,8 +285,7 @@ Result<VolumeSource> resampled(vtkDataSet& data, const VolumeRequest& request, c
     average->Update();
     values = average->GetOutput()->GetPointData()->GetArray(0);
     if (values == nullptr || values->GetNumberOfTuples() != data.GetNumberOfPoints())
-      return Error{
-          ErrorCode::file_malformed, "its cells' values cannot be taken to its points", {}, {}, "a whole grid"};
+      return refused(ErrorCode::file_malformed, "its cells' values cannot be taken to its points", {}, "a whole grid");
   }
   Sampler sampler(*plain, *values);
   std::vector<float> samples = sample_grid(sampler, nodes, components, progress);

@@ -17,6 +17,8 @@
 #include <cmath>
 #include <mutex>
 
+#include "asperity/io/detail/file_reading.h"
+
 namespace asperity::vtk_io {
 namespace {
 
@@ -113,8 +115,8 @@ VtkSession::~VtkSession() {
 Status VtkSession::status(const std::string& file) const {
   const std::string& text = state_->listener->first();
   if (text.empty()) return success();
-  return Error{
-      ErrorCode::file_malformed, fmt::format("VTK cannot read it: {}", sentence_of(text)), file, {}, "a whole file"};
+  return refused_file(ErrorCode::file_malformed, fmt::format("VTK cannot read it: {}", sentence_of(text)), file,
+                      "a whole file");
 }
 
 DataArrays arrays_of(vtkDataSet& data) {

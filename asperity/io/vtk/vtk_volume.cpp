@@ -15,6 +15,7 @@
 #include <fstream>
 #include <new>
 
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/vtk/file_checks.h"
 #include "asperity/io/vtk/vtk_data.h"
 
@@ -23,12 +24,6 @@ namespace vtk_io {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string suffix_of(const fs::path& path) {
-  std::string suffix = path.extension().string();
-  for (char& c : suffix) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return suffix;
-}
 
 /// From memory: what the check let through.
 vtkSmartPointer<vtkDataSet> read_legacy(const std::string& bytes) {
@@ -83,7 +78,7 @@ Result<VolumeSource> read_serial(const fs::path& path, const VolumeRequest& requ
 
 Result<VolumeSource> read_any(const fs::path& path, const VolumeRequest& request, const Progress& progress) {
   std::error_code ignored;
-  const std::string suffix = suffix_of(path);
+  const std::string suffix = lower_extension(path);
   const bool folder = fs::is_directory(path, ignored);
   if (!folder && !fs::is_regular_file(path, ignored))
     return refused(ErrorCode::file_missing, "no such file", {}, "a volume");
@@ -101,13 +96,10 @@ Result<std::string> file_bytes(const fs::path& path, std::size_t most_bytes) {
   const std::uintmax_t size = fs::file_size(path, problem);
   std::ifstream stream(path, std::ios::binary);
   if (problem || !stream || !fs::is_regular_file(path, problem))
-    return Error{ErrorCode::file_missing, "cannot be read", path.string(), {}, "a readable file"};
+    return refused_file(ErrorCode::file_missing, "cannot be read", path.string(), "a readable file");
   if (size > most_bytes) {
-    return Error{ErrorCode::too_large,
-                 fmt::format("has {} bytes", size),
-                 path.string(),
-                 {},
-                 fmt::format("at most {} MiB", most_bytes >> 20U)};
+    return refused_file(ErrorCode::too_large, fmt::format("has {} bytes", size), path.string(),
+                        fmt::format("at most {} MiB", most_bytes >> 20U));
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
@@ -117,38 +109,31 @@ Result<std::string> file_bytes(const fs::path& path, std::size_t most_bytes) {
 
 Result<vtkSmartPointer<vtkDataSet>> load_dataset(const fs::path& path, std::size_t most_bytes,
                                                  const VtkSession& session) {
-  const std::string suffix = suffix_of(path);
+  const std::string suffix = lower_extension(path);
   const std::string file = path.string();
   vtkSmartPointer<vtkDataSet> (*read)(const std::string&) = nullptr;
   std::string source = file;
   {
     // Let go of the bytes before VTK reads them again.
     ASPERITY_TRY(const std::string bytes, file_bytes(path, most_bytes));
-    Status checked = success();
     if (suffix == ".vtk") {
       // VTK counts the bytes of a text in 32 bits.
       constexpr std::size_t largest_legacy = (std::size_t{1} << 31U) - 1;
-      Result<std::string> kept = check_legacy(bytes, std::min(most_bytes, largest_legacy));
-      if (kept) {
-        source = std::move(*kept);
-      } else {
-        checked = std::move(kept).error();
-      }
+      ASPERITY_TRY(source, in_file(check_legacy(bytes, std::min(most_bytes, largest_legacy)), file));
       read = read_legacy;
     }
     for (const XmlKind& kind : xml_kinds) {
       if (suffix != kind.suffix) continue;
-      checked = check_xml(bytes, kind.type, most_bytes);
+      ASPERITY_CHECK(in_file(check_xml(bytes, kind.type, most_bytes), file));
       read = kind.read;
     }
-    if (!checked) return std::move(checked).error().in_file(file);
   }
   if (read == nullptr)
-    return Error{ErrorCode::file_unsupported, "is no volume format that is read here", file, {}, ".vti, .vtr"};
+    return refused_file(ErrorCode::file_unsupported, "is no volume format that is read here", file, ".vti, .vtr");
   vtkSmartPointer<vtkDataSet> data = read(source);
   ASPERITY_CHECK(session.status(file));
   if (data == nullptr || data->GetNumberOfPoints() == 0)
-    return Error{ErrorCode::file_empty, "holds no points", file, {}, "a volume"};
+    return refused_file(ErrorCode::file_empty, "holds no points", file, "a volume");
   return data;
 }
 
@@ -157,17 +142,12 @@ Result<vtkSmartPointer<vtkDataSet>> load_dataset(const fs::path& path, std::size
 Result<VolumeSource> read_vtk_volume(const std::filesystem::path& path, const VolumeRequest& request,
                                      const Progress& progress) {
   try {
-    Result<VolumeSource> source = vtk_io::read_any(path, request, progress);
-    if (!source) return std::move(source).error().in_file(path.string());
-    return source;
+    return in_file(vtk_io::read_any(path, request, progress), path.string());
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::too_large, "needs more memory than there is", path.string(), {}, "a smaller volume"};
+    return refused_file(ErrorCode::too_large, "needs more memory than there is", path.string(), "a smaller volume");
   } catch (const std::exception& failure) {
-    return Error{ErrorCode::file_malformed,
-                 fmt::format("VTK cannot read it: {}", failure.what()),
-                 path.string(),
-                 {},
-                 "a whole file"};
+    return refused_file(ErrorCode::file_malformed, fmt::format("VTK cannot read it: {}", failure.what()), path.string(),
+                        "a whole file");
   }
 }
 

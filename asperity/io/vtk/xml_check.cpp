@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "asperity/io/detail/mesh_readers.h"
@@ -18,40 +19,6 @@ constexpr std::uint64_t most_packed = 1100;
 // A value of 8 bytes takes two characters of text.
 constexpr std::uint64_t most_unpacked = 8;
 constexpr std::int64_t most_index = std::int64_t{1} << 30;
-
-int base64_value(char c) {
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  if (c == '+') return 62;
-  return c == '/' ? 63 : -1;
-}
-
-/// The first `count` bytes that base64 text decodes to; false where it ends or is none.
-bool decode_base64(std::string_view text, std::size_t count, std::string& bytes) {
-  bytes.clear();
-  std::uint32_t held = 0;
-  int digits = 0;
-  for (const char c : text) {
-    if (bytes.size() >= count) return true;
-    if (c == '=') break;
-    const int value = base64_value(c);
-    if (value < 0) return false;
-    held = (held << 6U) | static_cast<std::uint32_t>(value);
-    if (++digits == 4) {
-      for (const unsigned shift : {16U, 8U, 0U}) bytes.push_back(static_cast<char>((held >> shift) & 0xFFU));
-      digits = 0;
-      held = 0;
-    }
-  }
-  if (digits == 3) {
-    bytes.push_back(static_cast<char>((held >> 10U) & 0xFFU));
-    bytes.push_back(static_cast<char>((held >> 2U) & 0xFFU));
-  } else if (digits == 2) {
-    bytes.push_back(static_cast<char>((held >> 4U) & 0xFFU));
-  }
-  return bytes.size() >= count;
-}
 
 class XmlFile {
  public:
@@ -74,11 +41,8 @@ class XmlFile {
  private:
   [[nodiscard]] Error bad(const XmlElement& element, std::string what, std::string accepted,
                           ErrorCode code = ErrorCode::file_malformed) const {
-    return Error{code,
-                 fmt::format("<{}>: {}", element.name.substr(0, 40), what),
-                 {},
-                 line_of(text_, element.at),
-                 std::move(accepted)};
+    return refused(code, fmt::format("<{}>: {}", element.name.substr(0, 40), what), line_of(text_, element.at),
+                   std::move(accepted));
   }
 
   Status check_root() {
@@ -140,7 +104,7 @@ class XmlFile {
     ASPERITY_TRY(whole_, extent(element, "WholeExtent"));
     have_whole_ = true;
     if (type_ != "ImageData") return success();
-    if (element.has("Origin")) ASPERITY_CHECK(finite(element, "Origin", 3));
+    if (element.has("Origin")) ASPERITY_CHECK(numbers(text_, element, "Origin", 3));
     if (element.has("Direction")) {
       ASPERITY_TRY(const std::vector<double> direction, numbers(text_, element, "Direction", 9));
       for (std::size_t i = 0; i < 9; ++i) {
@@ -157,11 +121,6 @@ class XmlFile {
       }
     }
     return success();
-  }
-
-  Status finite(const XmlElement& element, std::string_view key, std::size_t count) {
-    Result<std::vector<double>> values = numbers(text_, element, key, count);
-    return values ? success() : Status(std::move(values).error());
   }
 
   Status check_piece(const XmlElement& element) {
@@ -295,10 +254,10 @@ class XmlFile {
                                            std::size_t count) const {
     const std::size_t length = count * word_;
     std::string decoded;
-    if (base64) {
-      if (!decode_base64(block, length, decoded)) decoded.clear();
-    } else {
+    if (!base64) {
       decoded = std::string(block.substr(0, length));
+    } else if (!mesh_readers::decode_base64(block.substr(0, (length + 2) / 3 * 4), length, decoded)) {
+      decoded.clear();
     }
     if (decoded.size() < length)
       return bad(element, "its data end within their header", "a whole file", ErrorCode::file_truncated);
@@ -372,21 +331,11 @@ class XmlFile {
 }  // namespace
 
 std::size_t xml_type_bytes(std::string_view type) {
-  static constexpr std::array<std::pair<std::string_view, std::size_t>, 11> types{{{"Int8", 1},
-                                                                                   {"UInt8", 1},
-                                                                                   {"Int16", 2},
-                                                                                   {"UInt16", 2},
-                                                                                   {"Int32", 4},
-                                                                                   {"UInt32", 4},
-                                                                                   {"Int64", 8},
-                                                                                   {"UInt64", 8},
-                                                                                   {"Float32", 4},
-                                                                                   {"Float64", 8},
-                                                                                   {"Bit", 1}}};
-  for (const auto& [name, bytes] : types) {
-    if (type == name) return bytes;
-  }
-  return 0;
+  static const std::map<std::string_view, std::size_t> bytes{
+      {"Int8", 1},  {"UInt8", 1},  {"Int16", 2},   {"UInt16", 2},  {"Int32", 4}, {"UInt32", 4},
+      {"Int64", 8}, {"UInt64", 8}, {"Float32", 4}, {"Float64", 8}, {"Bit", 1}};
+  const auto found = bytes.find(type);
+  return found == bytes.end() ? 0 : found->second;
 }
 
 Status check_xml(std::string_view bytes, std::string_view type, std::size_t most_bytes) {
