@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 namespace asperity {
@@ -95,16 +96,6 @@ std::vector<Parameter> parameters_of(FrictionKind kind, const FirstGuess& guess,
   return parameters;
 }
 
-double* member_of(FrictionLaw& law, const std::string& name) {
-  if (name == "stiffness") return &law.stiffness;
-  if (name == "damping") return &law.damping;
-  if (name == "viscosity") return &law.viscosity;
-  if (name == "stick_speed") return &law.stick_speed;
-  if (name == "stribeck_speed") return &law.stribeck_speed;
-  if (name == "exponent") return &law.exponent;
-  return name == "adhesion" ? &law.adhesion : nullptr;
-}
-
 /// The law at a point of the search.
 LawFit law_at(FrictionKind kind, const std::vector<Parameter>& parameters, std::span<const double> shares,
               const FitSettings& settings) {
@@ -119,7 +110,7 @@ LawFit law_at(FrictionKind kind, const std::vector<Parameter>& parameters, std::
     if (name == "load") fit.load = value;
     if (name == "dynamic_friction") fit.coefficients.sliding = value;
     if (name == "static_over_dynamic") over = value;
-    if (double* member = member_of(fit.law, name)) *member = value;
+    if (const auto member = member_of_law(name)) fit.law.*member = value;
   }
   fit.coefficients.still = over * fit.coefficients.sliding;
   if (fit.load <= 0.0) fit.load = settings.load.value_or(fit.mass * settings.gravity);
@@ -284,6 +275,18 @@ Status check(std::span<const FitTrace> traces, const FitSettings& settings) {
 }
 
 }  // namespace
+
+double FrictionLaw::*member_of_law(const std::string& name) {
+  static const std::map<std::string, double FrictionLaw::*> members{{"stiffness", &FrictionLaw::stiffness},
+                                                                    {"damping", &FrictionLaw::damping},
+                                                                    {"viscosity", &FrictionLaw::viscosity},
+                                                                    {"stick_speed", &FrictionLaw::stick_speed},
+                                                                    {"stribeck_speed", &FrictionLaw::stribeck_speed},
+                                                                    {"exponent", &FrictionLaw::exponent},
+                                                                    {"adhesion", &FrictionLaw::adhesion}};
+  const auto found = members.find(name);
+  return found == members.end() ? nullptr : found->second;
+}
 
 double FitErrors::misfit() const {
   return root_mean_square({level, period, amplitude, ratio, shape});

@@ -91,6 +91,9 @@ struct LawFit {
 /// three all are fitted. [main]
 void choose_fitted(std::vector<FitTrace>& traces);
 
+/// The number of a friction law that a parameter is; nullptr: none. [any]
+double FrictionLaw::*member_of_law(const std::string& name);
+
 /// Compares two measurements of stick-slip; `threshold` of both should be the same. [main]
 FitErrors compare_stick_slip(const StickSlip& measured, const StickSlip& predicted);
 

@@ -152,16 +152,9 @@ double friction_parameter(const LawFit& fit, const std::string& name) {
   if (name == "load") return fit.load;
   if (name == "dynamic_friction" && fit.coefficients.sliding > 0.0) return fit.coefficients.sliding;
   if (name == "static_friction" && fit.coefficients.still > 0.0) return fit.coefficients.still;
-  if (std::count(read.begin(), read.end(), name) > 0) {
-    if (name == "stiffness") return fit.law.stiffness;
-    if (name == "damping") return fit.law.damping;
-    if (name == "viscosity") return fit.law.viscosity;
-    if (name == "stick_speed") return fit.law.stick_speed;
-    if (name == "stribeck_speed") return fit.law.stribeck_speed;
-    if (name == "exponent") return fit.law.exponent;
-    if (name == "adhesion") return fit.law.adhesion;
-  }
-  return std::numeric_limits<double>::quiet_NaN();
+  const auto member = member_of_law(name);
+  const bool has = member != nullptr && std::count(read.begin(), read.end(), name) > 0;
+  return has ? fit.law.*member : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string error_words(double measured, double predicted) {

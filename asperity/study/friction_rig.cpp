@@ -22,8 +22,7 @@ Status check(const RigSettings& s) {
       return bad_value(fmt::format("is {:g}", value), name, "a number above 0");
   }
   if (!(s.warm_up.count() >= 0.0) || !std::isfinite(s.start) || !std::isfinite(s.start_speed))
-    return Error{
-        ErrorCode::bad_value, "is not finite, or negative", {}, "warm_up, start, start_speed", "finite numbers"};
+    return bad_value("is not finite, or negative", "warm_up, start, start_speed", "finite numbers");
   if (!(s.spacing >= s.dt) || !((s.warm_up + s.duration) / s.dt <= most_steps)) {
     return bad_value("does not fit the spacing, or is too short for the duration", "dt",
                      "a step of at most the spacing, and no more than 1e8 of them");
@@ -32,10 +31,6 @@ Status check(const RigSettings& s) {
 }
 
 }  // namespace
-
-double largest_contact_stiffness(const RigSettings& settings) {
-  return settings.mass / (settings.dt.count() * settings.dt.count());
-}
 
 Result<FrictionTrace> pull_slider(const FrictionLaw& law, const FrictionCoefficients& coefficients,
                                   const RigSettings& settings) {

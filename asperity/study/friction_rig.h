@@ -24,9 +24,6 @@ struct RigSettings {
   Seconds dt{1e-4};                ///< of a step, above 0 and short against the slider's own swings
 };
 
-/// The largest stiffness (N/m) with which the slider can be integrated with the settings' step: (m / dt^2). [any]
-double largest_contact_stiffness(const RigSettings& settings);
-
 /// Pulls the slider. The velocity that the law is told is the slider's own, the motion its displacement in a step
 /// (semi-implicit Euler, whose free swings neither grow nor decay).
 /// Errors: bad_value (not above 0, not finite, more than 1e8 steps; the law's own validate). [main]

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "asperity/io/recorded_path.h"
 #include "asperity/study/spectrum.h"
 
 namespace asperity {
@@ -23,25 +24,11 @@ constexpr std::uintmax_t largest_file = 256U << 20U;
 constexpr const char* accepted = "a CSV file with the columns t_s and friction_over_load";
 constexpr std::size_t phases = 64;
 
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-std::vector<std::string_view> cells_of(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (std::size_t at = 0;;) {
-    const std::size_t comma = line.find(',', at);
-    cells.push_back(trimmed(line.substr(at, comma - at)));
-    if (comma == std::string_view::npos) return cells;
-    at = comma + 1;
-  }
-}
-
 Error malformed(const fs::path& path, std::size_t line, std::string what) {
   return Error{ErrorCode::file_malformed, std::move(what), path.string(), fmt::format("line {}", line), accepted};
+}
+Error refused_trace(const fs::path& path, ErrorCode code, std::string what, std::string wanted = accepted) {
+  return refused(code, std::move(what), {}, std::move(wanted)).in_file(path.string());
 }
 
 /// The line's cell of a column as a number.
@@ -60,11 +47,11 @@ Result<double> number_in(const std::vector<std::string_view>& cells, std::size_t
 Status check_file(const fs::path& path) {
   std::error_code problem;
   const fs::file_status status = fs::status(path, problem);
-  if (!fs::exists(status)) return Error{ErrorCode::file_missing, "no such file", path.string(), {}, accepted};
-  if (fs::is_directory(status)) return Error{ErrorCode::file_missing, "is a folder", path.string(), {}, accepted};
+  if (!fs::exists(status)) return refused_trace(path, ErrorCode::file_missing, "no such file");
+  if (fs::is_directory(status)) return refused_trace(path, ErrorCode::file_missing, "is a folder");
   const std::uintmax_t size = fs::is_regular_file(status) ? fs::file_size(path, problem) : 0;
   if (!problem && size > largest_file)
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), path.string(), {}, "256 MiB at most"};
+    return refused_trace(path, ErrorCode::too_large, fmt::format("has {} bytes", size), "256 MiB at most");
   return success();
 }
 
@@ -75,10 +62,10 @@ struct Columns {
 
 Result<Columns> read_columns(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) return Error{ErrorCode::file_missing, "cannot be read", path.string(), {}, accepted};
+  if (!stream) return refused_trace(path, ErrorCode::file_missing, "cannot be read");
   std::string line;
-  if (!std::getline(stream, line)) return Error{ErrorCode::file_empty, "is empty", path.string(), {}, accepted};
-  const std::vector<std::string_view> names = cells_of(line);
+  if (!std::getline(stream, line)) return refused_trace(path, ErrorCode::file_empty, "is empty");
+  const std::vector<std::string_view> names = csv_cells(line);
   const auto column_of = [&](std::string_view name) {
     return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
   };
@@ -89,8 +76,8 @@ Result<Columns> read_columns(const fs::path& path) {
   }
   Columns columns;
   for (std::size_t number = 2; std::getline(stream, line); ++number) {
-    if (trimmed(line).empty()) continue;
-    const std::vector<std::string_view> cells = cells_of(line);
+    if (csv_trimmed(line).empty()) continue;
+    const std::vector<std::string_view> cells = csv_cells(line);
     ASPERITY_TRY(const double time, number_in(cells, time_column, "t_s", path, number));
     ASPERITY_TRY(const double friction, number_in(cells, friction_column, "friction_over_load", path, number));
     if (!columns.time.empty() && time <= columns.time.back()) return malformed(path, number, "t_s does not increase");
@@ -98,11 +85,8 @@ Result<Columns> read_columns(const fs::path& path) {
     columns.friction.push_back(friction);
   }
   if (columns.time.size() < fewest_samples) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("has {} samples", columns.time.size()),
-                 path.string(),
-                 {},
-                 fmt::format("{} samples or more", fewest_samples)};
+    return refused_trace(path, ErrorCode::bad_value, fmt::format("has {} samples", columns.time.size()),
+                         fmt::format("{} samples or more", fewest_samples));
   }
   return columns;
 }
@@ -118,11 +102,8 @@ std::optional<double> number_of_name(const std::string& name, const char* patter
 }
 
 Error drive_unknown(const fs::path& path, const char* what, const char* in_name, const char* option) {
-  return Error{ErrorCode::bad_value,
-               fmt::format("its name does not say the {}", what),
-               path.string(),
-               {},
-               fmt::format("\"{}\" in the name, or {}", in_name, option)};
+  return refused_trace(path, ErrorCode::bad_value, fmt::format("its name does not say the {}", what),
+                       fmt::format("\"{}\" in the name, or {}", in_name, option));
 }
 
 double percentile(std::vector<double> values, double share) {
@@ -228,11 +209,8 @@ Result<FrictionTrace> read_friction_trace(const fs::path& path, const FrictionTr
   // A gap in the middle of dense samples must not become a huge series.
   const double span = columns.time.back() - columns.time.front();
   if (span / trace.spacing > 10.0 * static_cast<double>(columns.time.size())) {
-    return Error{ErrorCode::bad_value,
-                 "has gaps that are longer than all of its samples",
-                 path.string(),
-                 {},
-                 "samples that are about evenly spaced"};
+    return refused_trace(path, ErrorCode::bad_value, "has gaps that are longer than all of its samples",
+                         "samples that are about evenly spaced");
   }
   trace.friction = resample(columns.time, columns.friction, trace.spacing);
   return trace;

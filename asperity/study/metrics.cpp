@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "asperity/study/detail/metric_rows.h"
 
 namespace asperity {
 namespace {
@@ -67,18 +70,11 @@ enum class Where { everywhere, near_edges, elsewhere };
 DirectionMetrics measure_direction(const RunSeries& series, Where where) {
   std::vector<double> angles;
   for (std::size_t i = 0; i < series.size(); ++i) {
-    if (!series.stroking[i] || !std::isfinite(series.direction_error[i])) continue;
+    if (!series.stroking[i]) continue;
     const bool near = i < series.near_edge.size() && series.near_edge[i] != 0;
     if (where == Where::everywhere || near == (where == Where::near_edges)) angles.push_back(series.direction_error[i]);
   }
-  DirectionMetrics m;
-  m.samples = angles.size();
-  if (angles.empty()) return m;
-  for (const double angle : angles) m.mean += angle;
-  m.mean /= static_cast<double>(angles.size());
-  m.p99 = percentile(angles, 0.99);
-  m.max = percentile(angles, 1.0);
-  return m;
+  return measure_angles(angles);
 }
 
 /// Highest minus lowest of the values it has seen; 0 for none.
@@ -233,14 +229,6 @@ FollowMetrics follow_of_run(std::span<const TraceRecord> records, const RunSerie
   return measure_follow(errors, path);
 }
 
-nlohmann::json number(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
-
-nlohmann::json peaks_json(const Spectrum& spectrum) {
-  return {{"peak_frequency", number(spectrum.peak_frequency)}, {"peak_density", number(spectrum.peak_density)}};
-}
-
 }  // namespace
 
 RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& series, const StrokePath& path) {
@@ -266,6 +254,20 @@ const char* flag_name(std::size_t bit) {
   return bit < 32 ? to_string(static_cast<TickFlag>(std::uint32_t{1} << bit)) : "unknown";
 }
 
+DirectionMetrics measure_angles(std::span<const double> angles) {
+  DirectionMetrics m;
+  for (const double angle : angles) {
+    if (!std::isfinite(angle)) continue;
+    ++m.samples;
+    m.mean += angle;
+  }
+  if (m.samples == 0) return m;
+  m.mean /= static_cast<double>(m.samples);
+  m.p99 = percentile(angles, 0.99);
+  m.max = percentile(angles, 1.0);
+  return m;
+}
+
 double percentile(std::span<const double> values, double p) {
   std::vector<double> finite;
   for (const double value : values) {
@@ -278,76 +280,81 @@ double percentile(std::span<const double> values, double p) {
   return finite[index];
 }
 
-namespace {
-
-nlohmann::json direction_part(const DirectionMetrics& m) {
-  return {{"samples", m.samples}, {"mean", number(m.mean)}, {"p99", number(m.p99)}, {"max", number(m.max)}};
+std::vector<MetricRow> metric_rows(const RunMetrics& m) {
+  constexpr double milli = 1e3;
+  constexpr double micro = 1e6;
+  constexpr double percent = 1e2;
+  constexpr double degrees = 180.0 / std::numbers::pi;
+  return {{"/ticks/count", "ticks", m.ticks.ticks},
+          {"/ticks/contact", "contact_ticks", m.ticks.contact},
+          {"/ticks/duration", "duration_s", m.ticks.duration},
+          {"/ticks/rate", "rate_hz", m.ticks.rate},
+          {"/ticks/length", "length_mm", m.ticks.length, milli},
+          {"/ticks/safety_interventions", "interventions", m.ticks.safety_interventions},
+          {"/ticks/largest_intervention", "largest_intervention_n", m.ticks.largest_intervention},
+          {"/force/mean", "force_mean_n", m.force.mean},
+          {"/force/max", "force_max_n", m.force.max},
+          {"/force/rms", "force_rms_n", m.force.rms},
+          {"/force/mean_normal", "force_normal_n", m.force.mean_normal},
+          {"/force/largest_jump", "jump_n", m.force.largest_jump},
+          {"/force/jump_tick", "jump_tick", m.force.jump_tick},
+          {"/force/jump_distance", "jump_mm", m.force.jump_distance, milli},
+          {"/direction/samples", "direction_samples", m.direction.samples},
+          {"/direction/mean", "direction_mean_deg", m.direction.mean, degrees},
+          {"/direction/p99", "direction_p99_deg", m.direction.p99, degrees},
+          {"/direction/max", "direction_max_deg", m.direction.max, degrees},
+          {"/height/samples", "height_samples", m.height.samples},
+          {"/height/excluded", "height_excluded", m.height.excluded},
+          {"/height/rms_error", "height_rms_um", m.height.rms_error, micro},
+          {"/height/max_error", "height_max_um", m.height.max_error, micro},
+          {"/height/amplitude", "relief_um", m.height.amplitude, micro},
+          {"/height/relative_error", "height_relative", m.height.relative_error},
+          {"/height/excursion", "excursion_um", m.height.excursion, micro},
+          {"/update/mean", "update_mean_us", m.update.mean, micro},
+          {"/update/p50", "update_p50_us", m.update.p50, micro},
+          {"/update/p99", "update_p99_us", m.update.p99, micro},
+          {"/update/p999", "update_p999_us", m.update.p999, micro},
+          {"/update/max", "update_max_us", m.update.max, micro},
+          {"/energy/work", "work_mj", m.energy.work, milli},
+          {"/energy/held_work", "held_work_mj", m.energy.held_work, milli},
+          {"/energy/absorbed", "absorbed_mj", m.energy.absorbed, milli},
+          {"/energy/generated", "generated_mj", m.energy.generated, milli},
+          {"/energy/mean_loop", "mean_loop_mj", m.energy.mean_loop, milli},
+          {"/follow/samples", "follow_samples", m.follow.samples},
+          {"/follow/excluded", nullptr, m.follow.excluded},
+          {"/follow/mean", "follow_mean_percent", m.follow.mean, percent},
+          {"/follow/min", "follow_min_percent", m.follow.min, percent},
+          {"/follow/max", "follow_max_percent", m.follow.max, percent},
+          {"/follow/global", "follow_global_percent", m.follow.global, percent},
+          {nullptr, "direction_near_deg", m.direction_near.mean, degrees},
+          {nullptr, "direction_far_deg", m.direction_far.mean, degrees},
+          {nullptr, "peak_normal_hz", m.spectrum.normal_time.peak_frequency},
+          {nullptr, "peak_tangential_hz", m.spectrum.tangential_time.peak_frequency},
+          {nullptr, "peak_normal_per_mm", m.spectrum.normal_distance.peak_frequency / milli},
+          {nullptr, "peak_tangential_per_mm", m.spectrum.tangential_distance.peak_frequency / milli}};
 }
 
-}  // namespace
-
 std::string metrics_json(const RunMetrics& m) {
-  nlohmann::json flags;
-  for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) flags[flag_name(bit)] = m.ticks.flags[bit];
-  nlohmann::json loops = nlohmann::json::array();
-  for (const double energy : m.energy.loops) loops.push_back(number(energy));
-  const nlohmann::json json = {{"ticks",
-                                {{"count", m.ticks.ticks},
-                                 {"contact", m.ticks.contact},
-                                 {"duration", m.ticks.duration},
-                                 {"rate", m.ticks.rate},
-                                 {"length", m.ticks.length},
-                                 {"flags", flags},
-                                 {"safety_interventions", m.ticks.safety_interventions},
-                                 {"largest_intervention", number(m.ticks.largest_intervention)}}},
-                               {"force",
-                                {{"mean", number(m.force.mean)},
-                                 {"max", number(m.force.max)},
-                                 {"rms", number(m.force.rms)},
-                                 {"mean_normal", number(m.force.mean_normal)},
-                                 {"largest_jump", number(m.force.largest_jump)},
-                                 {"jump_tick", m.force.jump_tick},
-                                 {"jump_distance", number(m.force.jump_distance)}}},
-                               {"direction",
-                                {{"samples", m.direction.samples},
-                                 {"mean", number(m.direction.mean)},
-                                 {"p99", number(m.direction.p99)},
-                                 {"max", number(m.direction.max)},
-                                 {"near_edges", direction_part(m.direction_near)},
-                                 {"elsewhere", direction_part(m.direction_far)}}},
-                               {"height",
-                                {{"samples", m.height.samples},
-                                 {"excluded", m.height.excluded},
-                                 {"rms_error", number(m.height.rms_error)},
-                                 {"max_error", number(m.height.max_error)},
-                                 {"amplitude", number(m.height.amplitude)},
-                                 {"relative_error", number(m.height.relative_error)},
-                                 {"excursion", number(m.height.excursion)}}},
-                               {"spectrum",
-                                {{"normal_time", peaks_json(m.spectrum.normal_time)},
-                                 {"tangential_time", peaks_json(m.spectrum.tangential_time)},
-                                 {"normal_distance", peaks_json(m.spectrum.normal_distance)},
-                                 {"tangential_distance", peaks_json(m.spectrum.tangential_distance)}}},
-                               {"update",
-                                {{"mean", number(m.update.mean)},
-                                 {"p50", number(m.update.p50)},
-                                 {"p99", number(m.update.p99)},
-                                 {"p999", number(m.update.p999)},
-                                 {"max", number(m.update.max)}}},
-                               {"energy",
-                                {{"work", number(m.energy.work)},
-                                 {"held_work", number(m.energy.held_work)},
-                                 {"absorbed", number(m.energy.absorbed)},
-                                 {"generated", number(m.energy.generated)},
-                                 {"loops", loops},
-                                 {"mean_loop", number(m.energy.mean_loop)}}},
-                               {"follow",
-                                {{"samples", m.follow.samples},
-                                 {"excluded", m.follow.excluded},
-                                 {"mean", number(m.follow.mean)},
-                                 {"min", number(m.follow.min)},
-                                 {"max", number(m.follow.max)},
-                                 {"global", number(m.follow.global)}}}};
+  // What is no number is written as null.
+  nlohmann::json json;
+  for (const MetricRow& row : metric_rows(m)) {
+    if (row.path != nullptr) json[nlohmann::json::json_pointer(row.path)] = row.value;
+  }
+  for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit)
+    json["ticks"]["flags"][flag_name(bit)] = m.ticks.flags[bit];
+  json["energy"]["loops"] = m.energy.loops;
+  const auto direction = [](const DirectionMetrics& d) {
+    return nlohmann::json{{"samples", d.samples}, {"mean", d.mean}, {"p99", d.p99}, {"max", d.max}};
+  };
+  json["direction"]["near_edges"] = direction(m.direction_near);
+  json["direction"]["elsewhere"] = direction(m.direction_far);
+  const auto peaks = [](const Spectrum& s) {
+    return nlohmann::json{{"peak_frequency", s.peak_frequency}, {"peak_density", s.peak_density}};
+  };
+  json["spectrum"] = {{"normal_time", peaks(m.spectrum.normal_time)},
+                      {"tangential_time", peaks(m.spectrum.tangential_time)},
+                      {"normal_distance", peaks(m.spectrum.normal_distance)},
+                      {"tangential_distance", peaks(m.spectrum.tangential_distance)}};
   return json.dump(2);
 }
 

@@ -112,5 +112,7 @@ std::string metrics_json(const RunMetrics& metrics);
 /// Smallest value that at least the share `p` (0 to 1) of `values` does not exceed (nearest rank); not-a-number when
 /// there is none. Values that are not finite are left out. [main]
 double percentile(std::span<const double> values, double p);
+/// What they are like; those that are no numbers are left out. [any]
+DirectionMetrics measure_angles(std::span<const double> angles);
 
 }  // namespace asperity

@@ -52,7 +52,7 @@ std::string lower(std::string_view text) {
 }
 
 Error at_line(ErrorCode code, std::string what, std::size_t line, std::string accepted) {
-  return Error{code, std::move(what), {}, fmt::format("line {}", line), std::move(accepted)};
+  return refused(code, std::move(what), fmt::format("line {}", line), std::move(accepted));
 }
 
 /// The factor to SI of a unit in any case; nothing where it is none.
@@ -158,16 +158,19 @@ Error too_many() {
 }
 
 Result<std::string> read_text(const fs::path& file) {
-  constexpr const char* accepted = "a CSV file or a trace (asperity score --synthesise writes one)";
+  const auto refuse = [&](ErrorCode code, std::string what,
+                          const char* accepted = "a CSV file or a trace (asperity score --synthesise writes one)") {
+    return refused(code, std::move(what), {}, accepted).in_file(file.string());
+  };
   std::error_code problem;
   const fs::file_status status = fs::status(file, problem);
-  if (!fs::exists(status)) return Error{ErrorCode::file_missing, "no such file", file.string(), {}, accepted};
-  if (fs::is_directory(status)) return Error{ErrorCode::file_unsupported, "is a folder", file.string(), {}, accepted};
+  if (!fs::exists(status)) return refuse(ErrorCode::file_missing, "no such file");
+  if (fs::is_directory(status)) return refuse(ErrorCode::file_unsupported, "is a folder");
   const std::uintmax_t size = fs::is_regular_file(status) ? fs::file_size(file, problem) : 0;
   if (!problem && size > largest_path_file)
-    return Error{ErrorCode::too_large, fmt::format("has {} bytes", size), file.string(), {}, "256 MiB at most"};
+    return refuse(ErrorCode::too_large, fmt::format("has {} bytes", size), "256 MiB at most");
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) return Error{ErrorCode::file_missing, "cannot be read", file.string(), {}, accepted};
+  if (!stream) return refuse(ErrorCode::file_missing, "cannot be read");
   return std::string(std::istreambuf_iterator<char>(stream), {});
 }
 
@@ -214,15 +217,12 @@ class Driver {
 
 Status check(const MeasuredPath& path, const ScoreSettings& settings) {
   if (path.samples.size() < 2)
-    return Error{
-        ErrorCode::bad_value, fmt::format("has {} samples", path.samples.size()), {}, "samples", "two or more"};
+    return bad_value(fmt::format("has {} samples", path.samples.size()), "samples", "two or more");
   if (path.samples.size() > most_measured_samples) return too_many();
   if (!(settings.rate > 0.0) || !std::isfinite(settings.rate))
     return bad_value(fmt::format("is {}", settings.rate), "rate", "a rate above 0 (Hz)");
-  if (!(settings.stiffness >= 0.0) || !std::isfinite(settings.stiffness)) {
-    return Error{
-        ErrorCode::bad_value, fmt::format("is {}", settings.stiffness), {}, "stiffness", "a stiffness above 0 (N/m)"};
-  }
+  if (!(settings.stiffness >= 0.0) || !std::isfinite(settings.stiffness))
+    return bad_value(fmt::format("is {}", settings.stiffness), "stiffness", "a stiffness above 0 (N/m)");
   if (!(settings.lead_in >= 0.0) || !std::isfinite(settings.lead_in))
     return bad_value(fmt::format("is {}", settings.lead_in), "lead_in", "a length of 0 or more");
   const double steps = path.samples.back().time.count() * settings.rate + static_cast<double>(path.samples.size());
@@ -252,22 +252,6 @@ void penetrations_of(std::span<const TraceRecord> records, PathScore& score) {
   score.largest_penetration = *std::max_element(depths.begin(), depths.end());
 }
 
-DirectionMetrics directions_of(const RunSeries& series) {
-  DirectionMetrics metrics;
-  std::vector<double> angles;
-  for (const double angle : series.direction_error) {
-    if (!std::isfinite(angle)) continue;
-    angles.push_back(angle);
-    metrics.mean += angle;
-    metrics.max = std::max(metrics.max, angle);
-  }
-  metrics.samples = angles.size();
-  if (angles.empty()) return metrics;
-  metrics.mean /= static_cast<double>(angles.size());
-  metrics.p99 = percentile(angles, 0.99);
-  return metrics;
-}
-
 }  // namespace
 
 Result<MeasuredPath> parse_measured_path(std::string_view text) {
@@ -294,10 +278,8 @@ Result<MeasuredPath> parse_measured_path(std::string_view text) {
     path.samples.push_back(sample);
   }
   if (!sources) return refused(ErrorCode::file_empty, "has no header line", {}, columns_accepted);
-  if (path.samples.size() < 2) {
-    return Error{
-        ErrorCode::file_malformed, fmt::format("has {} rows", path.samples.size()), {}, {}, "two rows or more"};
-  }
+  if (path.samples.size() < 2)
+    return refused(ErrorCode::file_malformed, fmt::format("has {} rows", path.samples.size()), {}, "two rows or more");
   start_at_zero(path.samples);
   return path;
 }
@@ -451,7 +433,7 @@ Result<PathScore> score_path(const Scene& scene, const MeasuredPath& path, const
       progress("scoring " + score.law, static_cast<double>(i) / static_cast<double>(driven.size()));
   }
   score.force = compare_forces(measured, score.rendered);
-  score.normal = directions_of(derive_series(records, scene, StrokePath()));
+  score.normal = measure_angles(derive_series(records, scene, StrokePath()).direction_error);
   penetrations_of(records, score);
   return score;
 }

@@ -181,16 +181,16 @@ Result<Picture> render_picture(const Scene& scene, const StrokePath& path, std::
 
 std::array<std::uint8_t, 3> force_colour(double fraction) {
   // Ten stops of viridis (van der Walt and Smith 2015), evenly spaced; straight lines in between.
-  static constexpr std::array<std::array<double, 3>, 10> stops{{{68, 1, 84},
-                                                                {72, 40, 120},
-                                                                {62, 73, 137},
-                                                                {49, 104, 142},
-                                                                {38, 130, 142},
-                                                                {31, 158, 137},
-                                                                {53, 183, 121},
-                                                                {110, 206, 88},
-                                                                {181, 222, 43},
-                                                                {253, 231, 37}}};
+  static constexpr auto stops = std::to_array<std::array<double, 3>>({{68, 1, 84},
+                                                                      {72, 40, 120},
+                                                                      {62, 73, 137},
+                                                                      {49, 104, 142},
+                                                                      {38, 130, 142},
+                                                                      {31, 158, 137},
+                                                                      {53, 183, 121},
+                                                                      {110, 206, 88},
+                                                                      {181, 222, 43},
+                                                                      {253, 231, 37}});
   const double at = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) * (stops.size() - 1) : 0.0;
   const std::size_t i = std::min(stops.size() - 2, static_cast<std::size_t>(at));
   const double u = at - static_cast<double>(i);

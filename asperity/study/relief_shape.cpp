@@ -407,11 +407,9 @@ Result<ReliefShape> measure_shape(const std::vector<SurfaceFeature>& features) {
   const FeatureSpec& only = features.front().spec();
   const bool round = only.kind == FeatureKind::grating || only.kind == FeatureKind::circular_grating;
   if (features.size() == 1 && round) return cosine_shape(only.wavelength.x(), only.amplitude);
-  if (features.size() == 1 && only.kind == FeatureKind::grid) {
-    ReliefShape shape = cosine_shape(std::min(only.wavelength.x(), only.wavelength.y()), only.amplitude);
-    // Crests alone reach this; how the rest is spread differs little between one cosine and a product of two.
-    return shape;
-  }
+  // Crests alone reach this; how the rest is spread differs little between one cosine and a product of two.
+  if (features.size() == 1 && only.kind == FeatureKind::grid)
+    return cosine_shape(std::min(only.wavelength.x(), only.wavelength.y()), only.amplitude);
   double longest = 0.0;
   double shortest = infinity;
   for (const SurfaceFeature& feature : features) {

@@ -111,8 +111,7 @@ Result<std::string> run_report_html(const RunReport& report) {
 }
 
 Result<std::string> compare_report_html(const CompareReport& report) {
-  if (report.entries.empty())
-    return Error{ErrorCode::bad_value, "has no laws to compare", "", "entries", "one law or more"};
+  if (report.entries.empty()) return bad_value("has no laws to compare", "entries", "one law or more");
   for (std::size_t i = 0; i < report.entries.size(); ++i)
     ASPERITY_CHECK(check_series(report.entries[i].series, fmt::format("entries[{}].series", i)));
   return page(report.origin.title + " - Asperity comparison", compare_data(report), report.picture);

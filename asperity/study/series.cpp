@@ -68,19 +68,13 @@ bool step_along(const TriangleMesh& mesh, const Coat& coat, const BasePoint& at,
 /// Derives one tick after the other; keeps the caches of the queries.
 class SeriesBuilder {
  public:
-  SeriesBuilder(const Scene& scene, const StrokePath& path, std::size_t ticks, const SeriesSettings& settings)
+  SeriesBuilder(const Scene& scene, const StrokePath& path, const SeriesSettings& settings)
       : scene_(scene),
         shapes_(settings.exact != nullptr ? *settings.exact : scene),
         edge_reach_(settings.edge_reach),
         path_(path),
         caches_(std::make_unique<SurfaceCache[]>(scene.instances().size())),
-        followed_(followed_instance(scene)) {
-    for (auto* column :
-         {&out_.time, &out_.distance, &out_.force, &out_.normal, &out_.tangential, &out_.friction, &out_.texture,
-          &out_.followed, &out_.relief, &out_.direction_error, &out_.work, &out_.stored, &out_.follow, &out_.update}) {
-      column->reserve(ticks);
-    }
-  }
+        followed_(followed_instance(scene)) {}
 
   void add(const TraceRecord& tick) {
     const StrokePose pose = path_.pose(tick.probe.time);
@@ -129,6 +123,18 @@ class SeriesBuilder {
   }
   static Pose pose_of(const Instance& instance, const TraceRecord& tick) {
     return instance.motion.at(instance.world_from_object, tick.probe.time);
+  }
+
+  /// A tick in the frame of what is touched.
+  struct Felt {
+    Pose pose;   ///< of the object
+    Vec3 force;  ///< the hand's (N)
+    Vec3 point;  ///< the proxy, or the probe where the law has none
+  };
+  [[nodiscard]] Felt in_object(const Instance& instance, const TraceRecord& tick) const {
+    const Pose pose = pose_of(instance, tick);
+    return {pose, pose.rotate_inverse(force_in_scene(tick)),
+            pose.apply_inverse(constrains(instance.law) ? tick.rendered.proxy : in_scene(tick))};
   }
 
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
@@ -182,22 +188,17 @@ class SeriesBuilder {
         add_texture(*instance, *implicit, tick);
       return;
     }
-    if (const ParametricSurface* parametric = parametric_of(shape)) {
-      add_smooth(*instance, parametric->view(), parametric->bounds(), tick, true);
-      return;
-    }
-    if (const CustomSurface* custom = custom_of(shape)) {
-      add_smooth(*instance, custom->view(), custom->bounds(), tick, true);
-      return;
-    }
-    const Pose pose = pose_of(*instance, tick);
+    const auto smooth = [&](const auto& surface) {
+      add_smooth(*instance, surface.view(), surface.bounds(), tick, true);
+    };
+    if (const ParametricSurface* parametric = parametric_of(shape)) return smooth(*parametric);
+    if (const CustomSurface* custom = custom_of(shape)) return smooth(*custom);
     const MeshSurface& base = *base_of(shape);
     const bool proxied = constrains(instance->law);
-    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
+    const auto [pose, force, felt] = in_object(*instance, tick);
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     BasePoint at = base_point(base, felt, cache);
     if (at.face == no_index) return;
-    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
     out_.near_edge.back() = near_sharp_edge(base, felt - at.height * at.up) ? 1 : 0;
     // Judged by the finest level, as it was then.
     const ReliefSurface* relief = relief_of(*instance);
@@ -238,11 +239,8 @@ class SeriesBuilder {
   template <class View>
   void add_smooth(const Instance& instance, const View& view, const Box& bounds, const TraceRecord& tick,
                   bool either_side) {
-    const Pose pose = pose_of(instance, tick);
-    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
-    const Vec3 felt = constrains(instance.law)
-                          ? pose.apply_inverse(tick.rendered.proxy)
-                          : Vec3(pose.apply_inverse(in_scene(tick)) + force / scene_stiffness(instance, tick));
+    auto [pose, force, felt] = in_object(instance, tick);
+    if (!constrains(instance.law)) felt += force / scene_stiffness(instance, tick);
     const Foot foot = view.nearest(felt, bounds.diagonal());
     if (!foot.found()) return;
     const Vec3 front = view.front(foot);
@@ -281,14 +279,11 @@ class SeriesBuilder {
 
   /// Heights over the mesh where a texture, or an offset, is what is felt.
   void add_texture(const Instance& instance, const ImplicitSurface& surface, const TraceRecord& tick) {
-    const Pose pose = pose_of(instance, tick);
-    const bool proxied = constrains(instance.law);
-    const Vec3 felt = pose.apply_inverse(proxied ? tick.rendered.proxy : in_scene(tick));
+    const auto [pose, force, felt] = in_object(instance, tick);
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     const BasePoint at = base_point(*surface.mesh(), felt, cache);
     if (at.face == no_index) return;
-    const Vec3 force = pose.rotate_inverse(force_in_scene(tick));
-    const double deflection = proxied ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
+    const double deflection = constrains(instance.law) ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.view(cache).first_touch({base + reach * at.up, base - reach * at.up}, Sides::front);
@@ -368,7 +363,7 @@ double edge_reach_of(const Scene& scene) {
 
 RunSeries derive_series(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path,
                         const SeriesSettings& settings) {
-  SeriesBuilder builder(scene, path, records.size(), settings);
+  SeriesBuilder builder(scene, path, settings);
   for (const TraceRecord& tick : records) builder.add(tick);
   return builder.take();
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "asperity/study/detail/metric_rows.h"
+
 namespace asperity {
 namespace {
 
@@ -127,62 +129,27 @@ json histogram(const UpdateMetrics& update) {
 
 /// The numbers of a run in the units of the page. Field names end in their unit.
 json numbers(const RunMetrics& m) {
-  json loops = json::array();
-  for (const double energy : m.energy.loops) loops.push_back(significant(energy * milli));
-  json flags = json::object();
-  for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) {
-    if (m.ticks.flags[bit] > 0) flags[flag_name(bit)] = m.ticks.flags[bit];
+  json data;
+  for (const MetricRow& row : metric_rows(m)) {
+    if (row.shown == nullptr) continue;
+    data[row.shown] = row.value.is_number_float() ? significant(row.value.get<double>() * row.scale) : row.value;
   }
-  return {
-      {"ticks", m.ticks.ticks},
-      {"contact_ticks", m.ticks.contact},
-      {"duration_s", significant(m.ticks.duration)},
-      {"rate_hz", significant(m.ticks.rate)},
-      {"length_mm", significant(m.ticks.length * milli)},
-      {"flags", flags},
-      {"interventions", m.ticks.safety_interventions},
-      {"largest_intervention_n", significant(m.ticks.largest_intervention)},
-      {"force_mean_n", significant(m.force.mean)},
-      {"force_max_n", significant(m.force.max)},
-      {"force_rms_n", significant(m.force.rms)},
-      {"force_normal_n", significant(m.force.mean_normal)},
-      {"jump_n", significant(m.force.largest_jump)},
-      {"jump_tick", m.force.jump_tick},
-      {"jump_mm", significant(m.force.jump_distance * milli)},
-      {"direction_samples", m.direction.samples},
-      {"direction_mean_deg", m.direction.samples > 0 ? significant(m.direction.mean * degrees) : json(nullptr)},
-      {"direction_p99_deg", m.direction.samples > 0 ? significant(m.direction.p99 * degrees) : json(nullptr)},
-      {"direction_max_deg", m.direction.samples > 0 ? significant(m.direction.max * degrees) : json(nullptr)},
-      {"direction_near_deg",
-       m.direction_near.samples > 0 ? significant(m.direction_near.mean * degrees) : json(nullptr)},
-      {"direction_far_deg", m.direction_far.samples > 0 ? significant(m.direction_far.mean * degrees) : json(nullptr)},
-      {"height_samples", m.height.samples},
-      {"height_excluded", m.height.excluded},
-      {"height_rms_um", significant(m.height.rms_error * micro)},
-      {"height_max_um", m.height.samples > 0 ? significant(m.height.max_error * micro) : json(nullptr)},
-      {"height_relative", significant(m.height.relative_error)},
-      {"relief_um", significant(m.height.amplitude * micro)},
-      {"excursion_um", significant(m.height.excursion * micro)},
-      {"peak_normal_hz", significant(m.spectrum.normal_time.peak_frequency)},
-      {"peak_tangential_hz", significant(m.spectrum.tangential_time.peak_frequency)},
-      {"peak_normal_per_mm", significant(m.spectrum.normal_distance.peak_frequency / milli)},
-      {"peak_tangential_per_mm", significant(m.spectrum.tangential_distance.peak_frequency / milli)},
-      {"update_mean_us", significant(m.update.mean * micro)},
-      {"update_p50_us", significant(m.update.p50 * micro)},
-      {"update_p99_us", significant(m.update.p99 * micro)},
-      {"update_p999_us", significant(m.update.p999 * micro)},
-      {"update_max_us", significant(m.update.max * micro)},
-      {"work_mj", significant(m.energy.work * milli)},
-      {"held_work_mj", significant(m.energy.held_work * milli)},
-      {"absorbed_mj", significant(m.energy.absorbed * milli)},
-      {"generated_mj", significant(m.energy.generated * milli)},
-      {"loops_mj", loops},
-      {"follow_samples", m.follow.samples},
-      {"follow_global_percent", significant(m.follow.global * percent)},
-      {"follow_mean_percent", significant(m.follow.mean * percent)},
-      {"follow_min_percent", significant(m.follow.min * percent)},
-      {"follow_max_percent", significant(m.follow.max * percent)},
-      {"mean_loop_mj", significant(m.energy.mean_loop * milli)}};
+  const auto unknown_without = [&](std::size_t samples, std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+      if (samples == 0) data[name] = nullptr;
+    }
+  };
+  unknown_without(m.direction.samples, {"direction_mean_deg", "direction_p99_deg", "direction_max_deg"});
+  unknown_without(m.direction_near.samples, {"direction_near_deg"});
+  unknown_without(m.direction_far.samples, {"direction_far_deg"});
+  unknown_without(m.height.samples, {"height_max_um"});
+  data["loops_mj"] = json::array();
+  for (const double energy : m.energy.loops) data["loops_mj"].push_back(significant(energy * milli));
+  data["flags"] = json::object();
+  for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) {
+    if (m.ticks.flags[bit] > 0) data["flags"][flag_name(bit)] = m.ticks.flags[bit];
+  }
+  return data;
 }
 
 json origin_data(const ReportOrigin& origin, const std::vector<ReportFact>& setup) {
@@ -276,7 +243,7 @@ Status check_series(const RunSeries& series, const std::string& place) {
                      series.work.size() == n && series.stored.size() == n && series.follow.size() == n &&
                      series.update.size() == n && series.near_step.size() == n && series.stroking.size() == n;
   if (equal) return success();
-  return Error{ErrorCode::bad_value, "has columns of different lengths", "", place, "columns with one value a tick"};
+  return bad_value("has columns of different lengths", place, "columns with one value a tick");
 }
 
 json run_data(const RunReport& report) {
