@@ -1,26 +1,18 @@
 #include "asperity/device/ideal_probe.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "asperity/device/detail/checks.h"
+
 namespace asperity {
-namespace {
-
-Status require_positive(double value, const char* place, const char* accepted) {
-  if (std::isfinite(value) && value > 0.0) return success();
-  return bad_value(fmt::format("is {}", value), place, accepted);
-}
-
-}  // namespace
-
 Result<IdealProbe> IdealProbe::build(StrokePath path, const IdealProbeSettings& settings) {
-  ASPERITY_CHECK(require_positive(settings.stiffness_estimate, "stiffness_estimate", "a stiffness above 0 (N/m)"));
-  ASPERITY_CHECK(require_positive(settings.bandwidth, "bandwidth", "a frequency above 0 (Hz)"));
-  ASPERITY_CHECK(require_positive(settings.max_depth, "max_depth", "a length above 0 (m)"));
+  ASPERITY_CHECK(require(settings.stiffness_estimate > 0.0, "stiffness_estimate", settings.stiffness_estimate,
+                         "a stiffness above 0 (N/m)"));
+  ASPERITY_CHECK(require(settings.bandwidth > 0.0, "bandwidth", settings.bandwidth, "a frequency above 0 (Hz)"));
+  ASPERITY_CHECK(require(settings.max_depth > 0.0, "max_depth", settings.max_depth, "a length above 0 (m)"));
   return IdealProbe(std::move(path), settings);
 }
 

@@ -2,7 +2,6 @@
 // An experiment: the scene, the device and hand that touch it, and the stroke they follow. What scene files hold.
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>

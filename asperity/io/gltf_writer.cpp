@@ -25,20 +25,6 @@ static_assert(std::endian::native == std::endian::little, "glTF's buffers are li
 constexpr std::uint64_t largest_file = std::numeric_limits<std::uint32_t>::max();
 constexpr const char* extension_name = "MPEG_haptic_material";
 
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      bits = (bits << 8U) | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : alphabet[(bits >> (18 - 6 * k)) & 63U];
-  }
-  return text;
-}
-
 /// The document and its one buffer, put together piece by piece.
 class GltfWriter {
  public:

@@ -400,6 +400,19 @@ Result<FloatImage> read_float_image(const std::filesystem::path& path, const std
   });
 }
 
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      bits = (bits << 8U) | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : alphabet[(bits >> (18 - 6 * k)) & 63U];
+  }
+  return text;
+}
+
 Result<HeightMap> float_heights(const FloatImage& image, const HeightMapSettings& settings, bool normalised) {
   const auto bad = [](const char* place, double value, const char* accepted) {
     return bad_value(fmt::format("is {}", value), place, accepted);

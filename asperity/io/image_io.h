@@ -54,6 +54,8 @@ Result<FloatImage> read_float_image_bytes(std::string_view bytes, const std::str
 /// becomes 0). Errors: those of HeightMap::build. [build]
 Result<HeightMap> float_heights(const FloatImage& image, const HeightMapSettings& settings, bool normalised = false);
 
+/// Bytes as text, for data URIs. [any]
+std::string base64(std::string_view bytes);
 /// Encodes grey, grey + alpha, RGB or RGBA with 8 or 16 bits as PNG. Errors: bad_value for an image that is none.
 /// [build]
 Result<std::string> encode_png(const Image& image);

@@ -2,7 +2,6 @@
 #include <tiny_obj_loader.h>
 
 #include <charconv>
-#include <limits>
 
 #include "asperity/io/detail/mesh_readers.h"
 

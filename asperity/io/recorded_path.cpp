@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
-#include <utility>
 
 #include "asperity/io/detail/file_reading.h"
 

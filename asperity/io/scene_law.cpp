@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "asperity/io/detail/scene_custom.h"
 #include "asperity/io/detail/scene_reader.h"

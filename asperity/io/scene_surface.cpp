@@ -160,7 +160,7 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
       // The coat lies by coordinates that were made from the mapping, which is what the scene says.
       return refused(ErrorCode::mismatch,
                      fmt::format("is \"{}\", seen from which the surface spans no area in the plane of the features",
-                                 mapping_name(texture.fine.mapping.settings().surface)),
+                                 to_string(texture.fine.mapping.settings().surface)),
                      reader.place_of("texture.mapping.surface"),
                      "another mapping (\"plane\" for a sheet) or another \"axis\" or \"origin\" of it; \"as\": "
                      "\"texture\" needs no area");

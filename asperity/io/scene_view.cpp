@@ -1,9 +1,6 @@
 // The view of a scene, how its surfaces move, and how changes are felt.
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <limits>
 
 #include "asperity/io/detail/scene_reader.h"
 

@@ -1,10 +1,8 @@
 // Volumes in a scene file, and the isosurfaces in them.
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "asperity/field/volume/derived_fields.h"
@@ -95,9 +93,7 @@ class GeneratorWords {
       generator_.speed = reader_.quantity("speed", Dimension::speed, generator_.speed, Range::positive());
     if (reader_.has("strength")) generator_.strength = reader_.number("strength", generator_.strength, Range{0.0, 0.9});
     if (reader_.has("time")) generator_.time = reader_.quantity("time", Dimension::time, generator_.time);
-    if (reader_.has("type")) {
-      generator_.type = reader_.choice("type", SampleType::float32);
-    }
+    if (reader_.has("type")) generator_.type = reader_.choice("type", SampleType::float32);
   }
 
  private:

@@ -117,10 +117,9 @@ std::string trace_sidecar_json(const Trace& trace) {
   Json columns = Json::array();
   for (const TraceColumn& column : trace_columns())
     columns.push_back(Json{{"name", column.name}, {"unit", column.unit}});
-  const Json flags{
-      {"1", "contact"},          {"2", "not_converged"}, {"4", "started_inside"},     {"8", "input_not_finite"},
-      {"16", "force_limited"},   {"32", "slew_limited"}, {"64", "output_not_finite"}, {"128", "contacts_dropped"},
-      {"256", "energy_limited"}, {"512", "coarse_data"}, {"1024", "field_force"},     {"2048", "texture_faded"}};
+  Json flags;
+  for (const auto& [flag, name] : Names<TickFlag>::table)
+    flags[std::to_string(static_cast<std::uint32_t>(flag))] = name;
   Json json;
   json["format"] = "asperity trace table";
   json["version"] = 1;

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <exception>
 #include <fstream>
-#include <iterator>
 #include <new>
 
 #include "asperity/io/detail/file_reading.h"
@@ -19,10 +18,7 @@ namespace fs = std::filesystem;
 constexpr const char* accepted_volume_formats =
     "a volume: .json (sidecar) or .raw, .vtk, .vti, .vtr, .vts, .vtu, .pvti, .pvtr, .nrrd, .nhdr, .foam";
 
-std::atomic<VolumeReader>& registered() {
-  static std::atomic<VolumeReader> reader{nullptr};
-  return reader;
-}
+constinit std::atomic<VolumeReader> registered_volume_reader{nullptr};
 
 bool is_case_folder(const fs::path& path) {
   std::error_code ignored;
@@ -60,7 +56,7 @@ Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& req
   };
   if (!fs::exists(status)) return refuse(ErrorCode::file_missing, "no such file");
   if (needs_volume_reader(path)) {
-    const VolumeReader reader = registered();
+    const VolumeReader reader = registered_volume_reader;
     if (reader == nullptr) {
       return refused_file(
           ErrorCode::file_unsupported, "is read with VTK, which this program was built without", path.string(),
@@ -81,11 +77,7 @@ Result<VolumeSource> read_checked(const fs::path& path, const VolumeRequest& req
 }  // namespace
 
 void register_volume_reader(VolumeReader reader) {
-  registered() = reader;
-}
-
-bool has_volume_reader() {
-  return registered() != nullptr;
+  registered_volume_reader = reader;
 }
 
 std::span<const std::string> volume_reader_suffixes() {

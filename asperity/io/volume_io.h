@@ -75,8 +75,6 @@ using VolumeReader = Result<VolumeSource> (*)(const std::filesystem::path&, cons
 
 /// Hands over the reader of formats that need a library of their own (asperity/io/vtk). nullptr takes it away. [main]
 void register_volume_reader(VolumeReader reader);
-/// Whether one was handed over. [any]
-bool has_volume_reader();
 
 /// Reads a volume. By its name:
 ///   .json           a sidecar: a JSON object that tells what a file of raw samples holds (see read_sidecar_volume)

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <new>
 
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/detail/scene_json.h"
 #include "asperity/io/detail/volume_assembly.h"
 
@@ -207,8 +207,7 @@ Result<VolumeSource> finish(Sidecar sidecar, const VolumeRequest& request) {
   array.values = sidecar.samples;
   volume_assembly::measure(sidecar.raw.samples, array);
   std::vector<std::string> notes;
-  ASPERITY_TRY(const std::size_t chosen, volume_assembly::choose_array(arrays, request, notes));
-  static_cast<void>(chosen);
+  ASPERITY_CHECK(volume_assembly::choose_array(arrays, request, notes));
   ASPERITY_TRY(VolumeSource source, volume_assembly::assemble(std::move(sidecar.raw), request));
   source.arrays = std::move(arrays);
   return source;

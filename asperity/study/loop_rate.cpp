@@ -1,6 +1,5 @@
 #include "asperity/study/loop_rate.h"
 
-#include <algorithm>
 #include <chrono>
 #include <optional>
 

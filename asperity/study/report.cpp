@@ -2,29 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "asperity/io/atomic_file.h"
+#include "asperity/io/image_io.h"
 #include "asperity/study/detail/page.h"
 #include "asperity/study/detail/page_data.h"
 
 namespace asperity {
 namespace {
-
-std::string base64(std::string_view bytes) {
-  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[group >> (18U - 6U * k) & 63U];
-  }
-  return out;
-}
 
 std::string page(const std::string& title, const nlohmann::json& data, const std::optional<Picture>& picture) {
   const std::string image =

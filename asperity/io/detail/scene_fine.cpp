@@ -405,10 +405,6 @@ class TextureReader {
 
 }  // namespace
 
-const char* mapping_name(IntermediateSurface surface) {
-  return to_string(surface);
-}
-
 Result<TexturePart> read_texture(ObjectReader& surface, const TextureHost& host, const Law& law,
                                  SceneContext& context) {
   if (!surface.has("texture")) {
@@ -461,7 +457,7 @@ void note_rendering(const Instance& instance, const StrokePath& path, double spe
           "surface \"{}\": {} of {} does not change along the surface under the stroke, as the mapping \"{}\" lays it "
           "there: no texture is felt of it (another axis, direction or mapping lays it along the surface)",
           instance.name, feature_name(feature.spec().kind), format_length(feature.wavelength()),
-          mapping_name(fine.mapping.settings().surface)));
+          to_string(fine.mapping.settings().surface)));
       continue;
     }
     const double share = texture_share(waves.shortest, speed, Seconds(1.0 / rate), fine.resolution);

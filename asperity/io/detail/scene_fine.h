@@ -23,9 +23,6 @@ Result<FinePart> read_friction(ObjectReader& material, SceneContext& context, Ma
 /// [build]
 void note_friction(const Instance& instance, const FinePart& part, SceneContext& context);
 
-/// "plane", "cylinder", "sphere", "box", "uv", as scenes call them. [any]
-const char* mapping_name(IntermediateSurface surface);
-
 /// What features are laid on.
 struct TextureHost {
   std::string name;

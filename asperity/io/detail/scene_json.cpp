@@ -9,6 +9,7 @@
 #include <set>
 
 #include "asperity/core/suggest.h"
+#include "asperity/io/detail/file_reading.h"
 
 namespace asperity {
 namespace {

@@ -15,7 +15,6 @@
 #include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/units.h"
-#include "asperity/io/detail/file_reading.h"
 
 namespace asperity {
 

@@ -12,6 +12,7 @@
 #include "asperity/device/profile.h"
 #include "asperity/device/simulated_device.h"
 #include "asperity/device/stroke.h"
+#include "asperity/io/detail/file_reading.h"
 #include "asperity/io/detail/scene_json.h"
 #include "asperity/render/scene.h"
 

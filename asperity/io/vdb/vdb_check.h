@@ -2,7 +2,6 @@
 // Private to asperity/io/vdb: what a .vdb file has to hold before OpenVDB is let at it. OpenVDB makes nodes for as many
 // children as a file declares, and goes on past the file's end; this walk ties every count to the bytes that are there.
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <string>

@@ -2,8 +2,6 @@
 // Private to asperity/io/vdb: what its parts owe each other.
 
 #include <filesystem>
-#include <string>
-#include <string_view>
 
 #include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/sparse_io.h"

@@ -6,12 +6,20 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
+#include <utility>
 
 #include "asperity/core/result.h"
 
 namespace asperity::vtk_io {
 
+/// What a table of types and their bytes says of one; 0: not known. [any]
+template <std::size_t Count>
+std::size_t bytes_of(const std::pair<std::string_view, std::size_t> (&types)[Count], std::string_view type) {
+  for (const auto& [name, bytes] : types) {
+    if (name == type) return bytes;
+  }
+  return 0;
+}
 /// Bytes of one value of a legacy or XML type ("unsigned_char", "UInt8"); 0: not known. Bits count as a byte.
 std::size_t legacy_type_bytes(std::string_view type);
 std::size_t xml_type_bytes(std::string_view type);

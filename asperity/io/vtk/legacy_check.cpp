@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <map>
 
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
@@ -331,7 +330,7 @@ class LegacyFile {
 }  // namespace
 
 std::size_t legacy_type_bytes(std::string_view type) {
-  static const std::map<std::string_view, std::size_t> types{
+  static constexpr std::pair<std::string_view, std::size_t> types[] = {
       {"bit", 1},           {"char", 1},           {"signed_char", 1},  {"unsigned_char", 1},
       {"short", 2},         {"unsigned_short", 2}, {"int", 4},          {"unsigned_int", 4},
       {"vtkidtype", 4},     {"float", 4},          {"double", 8},       {"long", 8},

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 
 #include "asperity/io/detail/mesh_readers.h"
 #include "asperity/io/vtk/file_checks.h"
@@ -22,45 +20,23 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::size_t nrrd_type_bytes(std::string_view type) {
-  static const std::map<std::string_view, std::size_t> bytes{
+  static constexpr std::pair<std::string_view, std::size_t> types[] = {
       {"signed char", 1},  {"int8", 1},       {"int8_t", 1},   {"uchar", 1},          {"unsigned char", 1},
       {"uint8", 1},        {"uint8_t", 1},    {"short", 2},    {"short int", 2},      {"int16", 2},
       {"int16_t", 2},      {"ushort", 2},     {"uint16", 2},   {"unsigned short", 2}, {"uint16_t", 2},
       {"int", 4},          {"signed int", 4}, {"int32", 4},    {"int32_t", 4},        {"uint", 4},
       {"unsigned int", 4}, {"uint32", 4},     {"uint32_t", 4}, {"int64", 8},          {"uint64", 8},
       {"long long", 8},    {"float", 4},      {"double", 8}};
-  const auto found = bytes.find(type);
-  return found == bytes.end() ? 0 : found->second;
+  return bytes_of(types, type);
 }
 
 /// Fields that say nothing of what is read here.
 bool is_other_field(std::string_view key) {
-  static const std::set<std::string_view> fields{"content",
-                                                 "centers",
-                                                 "centerings",
-                                                 "block size",
-                                                 "blocksize",
-                                                 "min",
-                                                 "max",
-                                                 "old min",
-                                                 "oldmin",
-                                                 "old max",
-                                                 "oldmax",
-                                                 "number",
-                                                 "thicknesses",
-                                                 "axis maxs",
-                                                 "axismaxs",
-                                                 "labels",
-                                                 "units",
-                                                 "space",
-                                                 "space dimension",
-                                                 "space units",
-                                                 "sample units",
-                                                 "sampleunits",
-                                                 "measurement frame",
-                                                 "axis units",
-                                                 "measurementframe"};
-  return fields.contains(key);
+  constexpr std::string_view fields =
+      "|content|centers|centerings|block size|blocksize|min|max|old min|oldmin|old max|oldmax|number|"
+      "thicknesses|axis maxs|axismaxs|labels|units|space|space dimension|space units|sample units|"
+      "sampleunits|measurement frame|axis units|measurementframe|";
+  return key.find('|') == std::string_view::npos && fields.find(fmt::format("|{}|", key)) != std::string_view::npos;
 }
 
 class NrrdFile {

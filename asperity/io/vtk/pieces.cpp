@@ -5,7 +5,6 @@
 #include <vtkRectilinearGrid.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "asperity/io/detail/file_reading.h"

@@ -84,8 +84,7 @@ Result<Axes> choose_axes(vtkDataSet& data, const VolumeRequest& request, std::si
       if (!axes[a].empty()) size[a] = axes[a].size();
     }
   }
-  ASPERITY_TRY(const std::size_t count, volume_assembly::sample_count(size, bytes_each, request.most_bytes));
-  static_cast<void>(count);
+  ASPERITY_CHECK(volume_assembly::sample_count(size, bytes_each, request.most_bytes));
   for (std::size_t a = 0; a < 3; ++a) {
     if (!axes[a].empty()) continue;
     const double length = bounds[2 * a + 1] - bounds[2 * a];

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 
 #include "asperity/io/detail/mesh_readers.h"
@@ -331,11 +330,10 @@ class XmlFile {
 }  // namespace
 
 std::size_t xml_type_bytes(std::string_view type) {
-  static const std::map<std::string_view, std::size_t> bytes{
+  static constexpr std::pair<std::string_view, std::size_t> types[] = {
       {"Int8", 1},  {"UInt8", 1},  {"Int16", 2},   {"UInt16", 2},  {"Int32", 4}, {"UInt32", 4},
       {"Int64", 8}, {"UInt64", 8}, {"Float32", 4}, {"Float64", 8}, {"Bit", 1}};
-  const auto found = bytes.find(type);
-  return found == bytes.end() ? 0 : found->second;
+  return bytes_of(types, type);
 }
 
 Status check_xml(std::string_view bytes, std::string_view type, std::size_t most_bytes) {

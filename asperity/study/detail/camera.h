@@ -1,9 +1,7 @@
 #pragma once
 // The view of a picture. Private to study.
 
-#include <array>
 #include <span>
-#include <vector>
 
 #include "asperity/core/math.h"
 
