@@ -24,19 +24,7 @@ constexpr std::size_t profile_count = 15;
 
 DeviceProfile impedance(const char* name, double force, double stiffness, double damping, double radius,
                         double resolution, double mass, double own_damping, double friction) {
-  DeviceProfile profile;
-  profile.name = name;
-  profile.max_force = force;
-  profile.max_stiffness = stiffness;
-  profile.max_damping = damping;
-  profile.workspace_radius = radius;
-  profile.position_resolution = resolution;
-  profile.mass = mass;
-  profile.damping = own_damping;
-  profile.friction = friction;
-  profile.slew_limit = force / full_force_time;
-  profile.rate = 1000.0;
-  return profile;
+  return {name, force, stiffness, damping, radius, resolution, mass, own_damping, friction, force / full_force_time};
 }
 
 // 250 N is the papers'; the radius is that of a sphere inside their 40 x 36 cm x 1 rad wedge (checklists H-dev). 2 kg

@@ -582,12 +582,7 @@ std::uint16_t normal_code(double component) {
 
 /// Of 16 bits, without samples yet.
 std::shared_ptr<Image> blank_image(int width, int height, int channels) {
-  auto image = std::make_shared<Image>();
-  image->width = width;
-  image->height = height;
-  image->channels = channels;
-  image->bits = 16;
-  return image;
+  return std::make_shared<Image>(Image{width, height, channels, 16, {}});
 }
 
 }  // namespace

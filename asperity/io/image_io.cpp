@@ -184,11 +184,7 @@ Result<Image> read_png(std::string_view bytes, const std::string& name) {
   ASPERITY_CHECK(check_size(file.width, file.height, bytes.size(), name));
   if (!prepare_png_rows(file)) return png_failure(file, name);
 
-  Image image;
-  image.width = static_cast<int>(file.width);
-  image.height = static_cast<int>(file.height);
-  image.channels = file.channels;
-  image.bits = file.bits == 16 ? 16 : 8;
+  Image image{static_cast<int>(file.width), static_cast<int>(file.height), file.channels, file.bits == 16 ? 16 : 8, {}};
   const std::size_t row_samples = static_cast<std::size_t>(file.width) * static_cast<std::size_t>(file.channels);
   const std::size_t count = row_samples * file.height;
   image.samples.resize(count);
@@ -333,10 +329,7 @@ Result<Image> read_jpeg(std::string_view bytes, const std::string& name) {
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
       stbi_load_from_memory(data, size, &width, &height, &channels, 0), stbi_image_free);
   if (pixels == nullptr) return failure();
-  Image image;
-  image.width = width;
-  image.height = height;
-  image.channels = channels;
+  Image image{width, height, channels, 8, {}};
   image.samples.assign(pixels.get(), pixels.get() + image.pixels() * static_cast<std::size_t>(channels));
   return image;
 }

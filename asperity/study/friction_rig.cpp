@@ -46,11 +46,8 @@ Result<FrictionTrace> pull_slider(const FrictionLaw& law, const FrictionCoeffici
   trace.speed = settings.speed;
   trace.spacing = static_cast<double>(every) * dt;
   trace.friction.reserve((steps - skipped) / every + 1);
-  FrictionContact contact;
-  contact.push = settings.load;
-  contact.stiffness = settings.contact_stiffness;
-  contact.dt = settings.dt;
-  contact.coefficients = coefficients;
+  FrictionContact contact{
+      .push = settings.load, .stiffness = settings.contact_stiffness, .dt = settings.dt, .coefficients = coefficients};
   FrictionState state;
   double stretch = settings.start * settings.load / settings.stiffness;  // of the pulling spring
   double velocity = settings.start_speed;

@@ -127,10 +127,7 @@ Status check(const PictureSettings& settings) {
 }
 
 Image to_image(const std::vector<Colour>& colours, int width, int height) {
-  Image image;
-  image.width = width;
-  image.height = height;
-  image.channels = 3;
+  Image image{width, height, 3, 8, {}};
   image.samples.reserve(3 * colours.size());
   for (const Colour& colour : colours) {
     for (const float value : colour)

@@ -137,12 +137,7 @@ Status HeightSourceReader::read_library(const SceneJson& json) {
   const std::uint64_t seed = reader.seed("seed", 0);
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(library_, at_place(library_mesostructure(name, size, seed), reader.place_of("library")));
-  HeightSidecar known;
-  known.file = "the library";
-  known.width = known.height = size;
-  known.high = library_.amplitude;
-  known.pixel = library_.tile / size;
-  sidecar_ = known;
+  sidecar_ = HeightSidecar{"the library", size, size, 0.0, library_.amplitude, library_.tile / size};
   reader_.take(key_, std::move(reader));
   return success();
 }
@@ -178,12 +173,8 @@ Status HeightSourceReader::read_sidecar() {
     return success();
   const auto number = [&](const SceneJson& value) { return value.is_number() ? value.get<double>() : std::nan(""); };
   const auto member = [&](const char* key) { return json->contains(key) ? number((*json)[key]) : std::nan(""); };
-  HeightSidecar sidecar;
-  sidecar.file = path.filename().string();
-  sidecar.width = image_.width;
-  sidecar.height = image_.height;
-  sidecar.low = member("height_min_m");
-  sidecar.high = member("height_max_m");
+  HeightSidecar sidecar{path.filename().string(), image_.width, image_.height, member("height_min_m"),
+                        member("height_max_m")};
   const bool sizes = member("width") == image_.width && member("height") == image_.height;
   const SceneJson pixel = json->contains("pixel_size_m") ? (*json)["pixel_size_m"] : SceneJson();
   if (pixel.is_array() && pixel.size() == 2) sidecar.pixel = Vec2(number(pixel[0]), number(pixel[1]));
