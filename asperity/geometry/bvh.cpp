@@ -15,34 +15,9 @@ constexpr int balanced_depth = 20;
 // range.
 constexpr float far_rounding = 1e5F;
 
-struct Primitive {
-  float lower[3];
-  float upper[3];
-  std::uint32_t face;
+struct Primitive : FloatBox {
+  std::uint32_t face = no_index;
   [[nodiscard]] float centre(int axis) const { return lower[axis] + upper[axis]; }
-};
-
-struct FloatBox {
-  float lower[3] = {1e30F, 1e30F, 1e30F};
-  float upper[3] = {-1e30F, -1e30F, -1e30F};
-  void include(const Primitive& p) {
-    for (int axis = 0; axis < 3; ++axis) {
-      lower[axis] = std::min(lower[axis], p.lower[axis]);
-      upper[axis] = std::max(upper[axis], p.upper[axis]);
-    }
-  }
-  void include(const FloatBox& b) {
-    for (int axis = 0; axis < 3; ++axis) {
-      lower[axis] = std::min(lower[axis], b.lower[axis]);
-      upper[axis] = std::max(upper[axis], b.upper[axis]);
-    }
-  }
-  [[nodiscard]] float area() const {
-    const float x = upper[0] - lower[0];
-    const float y = upper[1] - lower[1];
-    const float z = upper[2] - lower[2];
-    return x < 0.0F ? 0.0F : x * y + y * z + z * x;
-  }
 };
 
 struct Range {
@@ -76,14 +51,11 @@ class Bvh::Builder {
 
  private:
   [[nodiscard]] Primitive primitive(std::uint32_t face) const {
-    Primitive p{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}, face};
+    Primitive p{{}, face};
     for (const Vec3& corner : mesh_.corners(face)) {
       float local[3];
       bvh_.to_local(corner, local);
-      for (int axis = 0; axis < 3; ++axis) {
-        p.lower[axis] = std::min(p.lower[axis], local[axis]);
-        p.upper[axis] = std::max(p.upper[axis], local[axis]);
-      }
+      p.include(local, local);
     }
     return p;
   }
@@ -122,15 +94,12 @@ class Bvh::Builder {
 
   /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
   void split(Range range, int depth, Range& left, Range& right) {
-    float low[3] = {1e30F, 1e30F, 1e30F};
-    float high[3] = {-1e30F, -1e30F, -1e30F};
+    FloatBox centres;
     for (std::uint32_t i = range.first; i < range.last; ++i) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const float c = primitives_[i].centre(axis);
-        low[axis] = std::min(low[axis], c);
-        high[axis] = std::max(high[axis], c);
-      }
+      const float centre[3] = {primitives_[i].centre(0), primitives_[i].centre(1), primitives_[i].centre(2)};
+      centres.include(centre, centre);
     }
+    const auto& [low, high] = centres;
     int axis = 0;
     for (int other = 1; other < 3; ++other) {
       if (high[other] - low[other] > high[axis] - low[axis]) axis = other;

@@ -28,12 +28,8 @@ struct BvhFitting {
     std::uint32_t vertex[3][8];  ///< unused places repeat the first triangle
     std::uint32_t used;
   };
-  struct Bounds {
-    float lower[3];
-    float upper[3];
-  };
   std::vector<Corners> leaves;
-  std::vector<Bounds> bounds;
+  std::vector<FloatBox> bounds;
 };
 
 /// Bounding-volume hierarchy, eight wide, binned by surface area (Wald 2007); leaves hold up to eight triangles in
@@ -91,7 +87,6 @@ class Bvh {
     return sizeof(*this) + nodes_.capacity() * sizeof(Node) + leaves_.capacity() * sizeof(Leaf) +
            cylinders_.capacity() * sizeof(Cylinder);
   }
-  [[nodiscard]] const char* kernel_name() const noexcept { return kernels_->name; }
 
  private:
   static constexpr std::uint32_t leaf_bit = 0x80000000U;

@@ -11,13 +11,8 @@ namespace {
 
 #define ASPERITY_INLINE [[gnu::always_inline]] inline
 
-struct JoinedBox {
-  float lower[3];
-  float upper[3];
-};
-
 /// Which of the eight boxes meet `box`: not zero for those that do. Answers whether any does.
-ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const JoinedBox& box, std::int32_t (&met)[8]) {
+ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const FloatBox& box, std::int32_t (&met)[8]) {
   using Floats = float __attribute__((vector_size(32)));
   using Ints = std::int32_t __attribute__((vector_size(32)));
   Ints all = Ints{} - 1;
@@ -34,8 +29,8 @@ ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const JoinedBox& box, std::i
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-JoinedBox around(const BoxesOf8& boxes) {
-  JoinedBox all{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
+FloatBox around(const BoxesOf8& boxes) {
+  FloatBox all;
   for (int axis = 0; axis < 3; ++axis) {
     for (int i = 0; i < 8; ++i) {
       all.lower[axis] = std::min(all.lower[axis], boxes.lower[axis][i]);
@@ -45,38 +40,32 @@ JoinedBox around(const BoxesOf8& boxes) {
   return all;
 }
 
-void put(const JoinedBox& box, BoxesOf8& boxes, std::size_t i) {
-  for (int axis = 0; axis < 3; ++axis) {
-    boxes.lower[axis][i] = box.lower[axis];
-    boxes.upper[axis][i] = box.upper[axis];
-  }
-}
-
 }  // namespace
 
 class Bvh::Join {
  public:
   Join(const Bvh& bvh, std::span<const Box> boxes) : bvh_(bvh), leaves_(bvh.leaves_.size()), nodes_(bvh.nodes_.size()) {
-    constexpr JoinedBox nothing{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
     for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
       for (std::size_t i = 0; i < 8; ++i) {
         const std::uint32_t face = bvh.leaves_[leaf].face[i];
-        put(face == no_index ? nothing : local(boxes[face]), leaves_[leaf], i);
+        leaves_[leaf].set(i, face == no_index ? FloatBox{} : local(boxes[face]));
       }
     }
     for (std::size_t node = nodes_.size(); node-- > 0;) {
       for (std::size_t i = 0; i < 8; ++i) {
         const std::uint32_t child = bvh.nodes_[node].child[i];
-        const bool leaf = (child & leaf_bit) != 0;
-        put(child == empty_child ? nothing : around(leaf ? leaves_[child & ~leaf_bit] : nodes_[child]), nodes_[node],
-            i);
+        if (child == empty_child) {
+          nodes_[node].set(i, {});
+        } else {
+          nodes_[node].set(i, around((child & leaf_bit) != 0 ? leaves_[child & ~leaf_bit] : nodes_[child]));
+        }
       }
     }
   }
 
   ASPERITY_INLINE void run(const MeetingVisit& visit) const {
     for (std::uint32_t leaf = 0; leaf < leaves_.size(); ++leaf) {
-      const JoinedBox whole = around(leaves_[leaf]);
+      const FloatBox whole = around(leaves_[leaf]);
       std::uint32_t stack[stack_capacity];
       int top = 0;
       stack[top++] = 0;
@@ -96,7 +85,6 @@ class Bvh::Join {
       }
     }
   }
-  void run_plain(const MeetingVisit& visit) const { run(visit); }
 #if defined(__x86_64__)
   __attribute__((target("avx2"))) void run_avx2(const MeetingVisit& visit) const {
     run(visit);
@@ -105,8 +93,8 @@ class Bvh::Join {
 
  private:
   /// In the hierarchy's own units, grown by more than their rounding.
-  [[nodiscard]] JoinedBox local(const Box& box) const {
-    JoinedBox grown;
+  [[nodiscard]] FloatBox local(const Box& box) const {
+    FloatBox grown;
     bvh_.to_local(box.lower, grown.lower);
     bvh_.to_local(box.upper, grown.upper);
     for (int axis = 0; axis < 3; ++axis) {
@@ -121,8 +109,8 @@ class Bvh::Join {
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint32_t face = bvh_.leaves_[one].face[i];
       if (face == no_index) continue;
-      const JoinedBox box{{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
-                          {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
+      const FloatBox box{{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
+                         {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
       std::int32_t met[8];
       if (!meeting(leaves_[other], box, met)) continue;
       for (std::size_t j = one == other ? i + 1 : 0; j < 8; ++j) {
@@ -142,7 +130,7 @@ void Bvh::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit
   static const bool wide = __builtin_cpu_supports("avx2");
   if (wide) return join.run_avx2(visit);
 #endif
-  join.run_plain(visit);
+  join.run(visit);
 }
 
 void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const {
@@ -158,12 +146,10 @@ void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const MeetingVi
   std::vector<std::uint32_t> last_met(boxes.size(), no_index);
   for (std::uint32_t face = 0; face < boxes.size(); ++face) {
     for_each_in_box(boxes[face].grown(farther), [&](std::uint32_t other) {
-      const Box& a = boxes[face];
-      const Box& b = boxes[other];
       // A face that stands in several cells counts once.
       if (other <= face || last_met[other] == face) return;
       last_met[other] = face;
-      if ((a.lower.array() <= b.upper.array()).all() && (b.lower.array() <= a.upper.array()).all()) visit(face, other);
+      if (boxes[face].overlaps(boxes[other])) visit(face, other);
     });
   }
 }

@@ -1,6 +1,5 @@
 // Fitting the hierarchy to the places of its triangles, leaves first. Building ends with the same code.
 
-#include <algorithm>
 #include <cmath>
 
 #include "asperity/geometry/bvh.h"
@@ -12,7 +11,6 @@ namespace asperity {
 /// The work itself, for one leaf or node at a time; eight triangles, or eight boxes, side by side.
 class Bvh::Fitter {
  public:
-  using Bounds = BvhFitting::Bounds;
   using Floats = float __attribute__((vector_size(32)));
   using Doubles = double __attribute__((vector_size(64)));
 
@@ -38,7 +36,7 @@ class Bvh::Fitter {
 
   /// Triangles, cylinder and bounds of one leaf.
   ASPERITY_INLINE static void fit_leaf(const Bvh& bvh, const Vec3* positions, const BvhFitting::Corners& corners,
-                                       Leaf& leaf, Cylinder& cylinder, Bounds& bounds) {
+                                       Leaf& leaf, Cylinder& cylinder, FloatBox& bounds) {
     const std::size_t used = corners.used;
     const auto at = [&](std::size_t i, std::size_t corner) -> const Vec3& {
       return positions[corners.vertex[corner][i]];
@@ -90,7 +88,7 @@ class Bvh::Fitter {
   /// All of a node's boxes, from leaves and nodes that have been fitted before.
   ASPERITY_INLINE static void fit_node(Bvh& bvh, const BvhFitting& fitting, Node& node) {
     for (std::size_t i = 0; i < 8; ++i) {
-      Bounds bounds{{1e30F, 1e30F, 1e30F}, {-1e30F, -1e30F, -1e30F}};
+      FloatBox bounds;
       if (node.child[i] != empty_child) {
         if ((node.child[i] & leaf_bit) != 0) {
           bounds = fitting.bounds[node.child[i] & ~leaf_bit];
@@ -98,14 +96,11 @@ class Bvh::Fitter {
           around(bvh.nodes_[node.child[i]], bounds);
         }
       }
-      for (int axis = 0; axis < 3; ++axis) {
-        node.boxes.lower[axis][i] = bounds.lower[axis];
-        node.boxes.upper[axis][i] = bounds.upper[axis];
-      }
+      node.boxes.set(i, bounds);
     }
   }
 
-  ASPERITY_INLINE static void around(const Node& node, Bounds& bounds) {
+  ASPERITY_INLINE static void around(const Node& node, FloatBox& bounds) {
     for (int axis = 0; axis < 3; ++axis) {
       Floats x;
       load(node.boxes.lower[axis], x);
@@ -145,12 +140,9 @@ class Bvh::Fitter {
       fit_node(bvh, fitting, bvh.nodes_[i]);
       surface += static_cast<double>(half_surface(bvh.nodes_[i]));
     }
-    Bounds root;
+    FloatBox root;
     around(bvh.nodes_.front(), root);
-    const float x = root.upper[0] - root.lower[0];
-    const float y = root.upper[1] - root.lower[1];
-    const float z = root.upper[2] - root.lower[2];
-    const auto whole = static_cast<double>(x * y + y * z + z * x);
+    const auto whole = static_cast<double>(root.area());
     bvh.cost_ = whole > 0.0 ? 1.0 + surface / whole : 1.0;
   }
 
@@ -158,7 +150,7 @@ class Bvh::Fitter {
   /// The cylinder around a leaf: its axis is the mean normal, by area. Measured by the sums that searches form.
   ASPERITY_INLINE static void fit_cylinder(const Floats (&a)[3], const Floats (&b)[3], const Floats (&c)[3],
                                            const Floats (&e1)[3], const Floats (&e2)[3], std::size_t used,
-                                           const Bounds& bounds, Cylinder& cylinder) {
+                                           const FloatBox& bounds, Cylinder& cylinder) {
     Floats counts;
     for (std::size_t i = 0; i < 8; ++i) counts[i] = i < used ? 1.0F : 0.0F;
     const Vec3 normal(static_cast<double>(sum_of(counts * (e1[1] * e2[2] - e1[2] * e2[1]))),

@@ -33,6 +33,12 @@ struct SweptHit {
   double side = 1.0;
 };
 
+/// A point meets a smooth surface: `side` 1 from the front, -1 from the back. [servo]
+inline SweptHit point_touch(double t, double side, const Vec3& point, const Vec3& front, std::uint32_t element,
+                            const Vec3& at) noexcept {
+  return {true, t, {point, side * front, 0.0, element, at}, side};
+}
+
 /// More planes than three are never active at once; the others are kept until the solve has chosen.
 using ContactSet = FixedVector<Foot, 24>;
 

@@ -31,10 +31,6 @@ std::uint32_t index(int value) {
   return static_cast<std::uint32_t>(value);
 }
 
-std::array<Vec2f, 3> equilateral_uvs() {
-  return {Vec2f(0.0F, 0.0F), Vec2f(1.0F, 0.0F), Vec2f(0.5F, static_cast<float>(std::sqrt(3.0) / 2.0))};
-}
-
 MeshSource icosahedron() {
   MeshSource source;
   const double golden = std::numbers::phi;
@@ -61,21 +57,34 @@ MeshSource icosahedron() {
   return source;
 }
 
+/// Numbers the distinct edges of triangles in the order in which they come up.
+class EdgeNumbers {
+ public:
+  explicit EdgeNumbers(std::size_t most) : table_(most) {}
+  /// The number of the edge between two vertices; size() as it was before where the edge is new.
+  std::uint32_t operator()(std::uint32_t a, std::uint32_t b) {
+    const std::uint64_t key = (std::uint64_t{std::min(a, b)} << 32U) | std::max(a, b);
+    const std::uint32_t known = table_.find_or_insert(mixed_bits(key), size(), [&](auto i) { return keys_[i] == key; });
+    if (known != no_index) return known;
+    keys_.push_back(key);
+    return size() - 1;
+  }
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(keys_.size()); }
+
+ private:
+  IndexTable table_;
+  std::vector<std::uint64_t> keys_;
+};
+
 /// Cuts every triangle in four at its edges' midpoints, moved out to the unit sphere.
 void subdivide_on_sphere(MeshSource& source) {
-  const std::size_t edges = source.triangles.size() * 3 / 2;
-  IndexTable table(edges);
-  std::vector<std::uint64_t> keys;
-  keys.reserve(edges);
+  EdgeNumbers edges(source.triangles.size() * 3 / 2);
   const auto first = static_cast<std::uint32_t>(source.positions.size());
   const auto midpoint = [&](std::uint32_t a, std::uint32_t b) {
-    const std::uint64_t key = (std::uint64_t{std::min(a, b)} << 32U) | std::max(a, b);
-    const auto next = static_cast<std::uint32_t>(keys.size());
-    const std::uint32_t known = table.find_or_insert(mixed_bits(key), next, [&](auto i) { return keys[i] == key; });
-    if (known != no_index) return first + known;
-    keys.push_back(key);
-    source.positions.push_back((source.positions[a] + source.positions[b]).normalized());
-    return first + next;
+    const std::uint32_t place = first + edges(a, b);
+    if (place == source.positions.size())
+      source.positions.push_back((source.positions[a] + source.positions[b]).normalized());
+    return place;
   };
   std::vector<Triangle> finer;
   finer.reserve(4 * source.triangles.size());
@@ -90,21 +99,16 @@ void subdivide_on_sphere(MeshSource& source) {
 
 /// Mean over the distinct edges: an edge of two triangles counts once.
 double mean_edge_of(const MeshSource& source) {
-  IndexTable table(3 * source.triangles.size());
-  std::vector<std::uint64_t> keys;
+  EdgeNumbers edges(3 * source.triangles.size());
   double sum = 0.0;
   for (const Triangle& t : source.triangles) {
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t a = t[i];
-      const std::uint32_t b = t[(i + 1) % 3];
-      const std::uint64_t key = (std::uint64_t{std::min(a, b)} << 32U) | std::max(a, b);
-      const auto next = static_cast<std::uint32_t>(keys.size());
-      if (table.find_or_insert(mixed_bits(key), next, [&](auto k) { return keys[k] == key; }) != no_index) continue;
-      keys.push_back(key);
-      sum += (source.positions[a] - source.positions[b]).norm();
+      const std::uint32_t next = edges.size();
+      if (edges(t[i], t[(i + 1) % 3]) == next)
+        sum += (source.positions[t[i]] - source.positions[t[(i + 1) % 3]]).norm();
     }
   }
-  return sum / static_cast<double>(keys.size());
+  return sum / edges.size();
 }
 
 void scale_to_mean_edge(MeshSource& source, double mean_edge) {
@@ -134,32 +138,36 @@ TrialMeshSettings checked(TrialMeshSettings settings) {
   return settings;
 }
 
-/// M_a with edge 1: vertex row j lies at y = j * sqrt(3)/2, odd rows shifted by half an edge.
-MeshSource unit_lattice(const TrialMeshSettings& settings) {
+/// Rows of cells of two triangles each in z = 0: `place(i, j)` of the vertex in column i and row j; cells are cut from
+/// their first corner to the last one, and the other way in even rows where they are to `zigzag`.
+template <class PlaceOf>
+MeshSource sheet(std::uint32_t columns, std::uint32_t rows, bool zigzag, const PlaceOf& place) {
   MeshSource source;
-  const double height = std::sqrt(3.0) / 2.0;
-  for (int j = 0; j <= settings.rows; ++j) {
-    for (int i = 0; i <= settings.columns; ++i) {
-      const double x = i + 0.5 * (j % 2) - 0.5 * settings.columns - 0.25;
-      source.positions.emplace_back(x, (j - 0.5 * settings.rows) * height, 0.0);
-    }
+  source.positions.reserve(std::size_t{columns + 1} * (rows + 1));
+  source.triangles.reserve(std::size_t{2} * columns * rows);
+  for (std::uint32_t j = 0; j <= rows; ++j) {
+    for (std::uint32_t i = 0; i <= columns; ++i) source.positions.push_back(place(i, j));
   }
-  const std::uint32_t stride = index(settings.columns) + 1;
-  for (std::uint32_t j = 0; j < index(settings.rows); ++j) {
-    for (std::uint32_t i = 0; i < index(settings.columns); ++i) {
-      const std::uint32_t a = j * stride + i;
-      const std::uint32_t c = a + stride;
-      if (j % 2 == 0) {
-        source.triangles.push_back({a, a + 1, c});
-        source.triangles.push_back({a + 1, c + 1, c});
-      } else {
-        source.triangles.push_back({a, a + 1, c + 1});
-        source.triangles.push_back({a, c + 1, c});
-      }
+  for (std::uint32_t j = 0; j < rows; ++j) {
+    for (std::uint32_t i = 0; i < columns; ++i) {
+      const std::uint32_t a = j * (columns + 1) + i;
+      const std::uint32_t d = a + columns + 1;
+      const bool back = zigzag && j % 2 == 0;
+      source.triangles.push_back({a, a + 1, back ? d : d + 1});
+      source.triangles.push_back({back ? a + 1 : a, d + 1, d});
     }
   }
   set_planar_uvs(source);
   return source;
+}
+
+/// M_a with edge 1: vertex row j lies at y = j * sqrt(3)/2, odd rows shifted by half an edge.
+MeshSource unit_lattice(const TrialMeshSettings& settings) {
+  const double height = std::sqrt(3.0) / 2.0;
+  return sheet(index(settings.columns), index(settings.rows), true, [&](std::uint32_t i, std::uint32_t j) {
+    const double x = i + 0.5 * (j % 2) - 0.5 * settings.columns - 0.25;
+    return Vec3(x, (j - 0.5 * settings.rows) * height, 0.0);
+  });
 }
 
 /// Number of columns whose cells come nearest to squares, among the divisors of `cells`.
@@ -178,25 +186,9 @@ std::uint32_t squarest_columns(double width, double depth, std::uint32_t cells) 
 }
 
 MeshSource rectangle(double width, double depth, std::uint32_t columns, std::uint32_t rows) {
-  MeshSource source;
-  source.positions.reserve(std::size_t{columns + 1} * (rows + 1));
-  source.triangles.reserve(std::size_t{2} * columns * rows);
-  for (std::uint32_t j = 0; j <= rows; ++j) {
-    for (std::uint32_t i = 0; i <= columns; ++i) {
-      source.positions.emplace_back((static_cast<double>(i) / columns - 0.5) * width,
-                                    (static_cast<double>(j) / rows - 0.5) * depth, 0.0);
-    }
-  }
-  for (std::uint32_t j = 0; j < rows; ++j) {
-    for (std::uint32_t i = 0; i < columns; ++i) {
-      const std::uint32_t a = j * (columns + 1) + i;
-      const std::uint32_t d = a + columns + 1;
-      source.triangles.push_back({a, a + 1, d + 1});
-      source.triangles.push_back({a, d + 1, d});
-    }
-  }
-  set_planar_uvs(source);
-  return source;
+  return sheet(columns, rows, false, [&](std::uint32_t i, std::uint32_t j) {
+    return Vec3((static_cast<double>(i) / columns - 0.5) * width, (static_cast<double>(j) / rows - 0.5) * depth, 0.0);
+  });
 }
 
 /// Position on ring `ring`, `step` of 6 * ring around, of a cup of radius 1 whose rim is at `opening`.
@@ -273,15 +265,12 @@ class Displacement {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = t[k];
       const std::uint32_t b = t[(k + 1) % 3];
-      const std::uint64_t key = (std::uint64_t{std::min(a, b)} << 32U) | std::max(a, b);
-      const auto next = static_cast<std::uint32_t>(keys_.size());
-      const std::uint32_t known = edges_.find_or_insert(mixed_bits(key), next, [&](auto e) { return keys_[e] == key; });
-      if (known == no_index) {
-        keys_.push_back(key);
+      const std::uint32_t number = edges_(a, b);
+      if (number == first_inside_.size()) {
         first_inside_.push_back(index_of_next());
         points_.resize(points_.size() + parts_ - 1);
       }
-      edge_[k] = first_inside_[known == no_index ? next : known];
+      edge_[k] = first_inside_[number];
       forward_[k] = a < b;
     }
   }
@@ -341,10 +330,9 @@ class Displacement {
 
   const TriangleMesh& base_;
   std::uint32_t parts_;
-  IndexTable edges_;
-  std::vector<std::uint64_t> keys_;  // of the edges numbered so far, and the first point inside each
-  std::vector<std::uint32_t> first_inside_;
-  std::array<std::uint32_t, 3> edge_{};  // of the face at hand
+  EdgeNumbers edges_;
+  std::vector<std::uint32_t> first_inside_;  // the first point inside each of the edges numbered so far
+  std::array<std::uint32_t, 3> edge_{};      // of the face at hand
   std::array<bool, 3> forward_{};
   std::vector<std::uint32_t> row_;
   std::vector<Point> points_;
@@ -391,7 +379,9 @@ MeshSource icosphere(int subdivisions, double radius) {
   for (int i = 0; i < times; ++i) subdivide_on_sphere(source);
   const double checked_radius = length_within(radius);
   for (Vec3& position : source.positions) position *= checked_radius;
-  source.corner_uvs.assign(source.triangles.size(), equilateral_uvs());
+  const std::array<Vec2f, 3> equilateral = {Vec2f(0.0F, 0.0F), Vec2f(1.0F, 0.0F),
+                                            Vec2f(0.5F, static_cast<float>(std::sqrt(3.0) / 2.0))};
+  source.corner_uvs.assign(source.triangles.size(), equilateral);
   return source;
 }
 

@@ -272,7 +272,7 @@ class TriangleMesh::EdgeSurvey {
     parents_.resize(faces.size());
     for (std::uint32_t i = 0; i < faces.size(); ++i) {
       const Triangle& t = mesh_.triangles()[faces[i]];
-      const std::size_t corner = t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+      const std::size_t corner = mesh_.corner_of(faces[i], vertex);
       uses_.push_back({t[(corner + 1) % 3], 2 * i + 1});
       uses_.push_back({t[(corner + 2) % 3], 2 * i});
       parents_[i] = i;
@@ -389,18 +389,15 @@ Status TriangleMesh::place(std::span<const Vec3> positions) {
     return refused(ErrorCode::mismatch, fmt::format("has {} positions", positions.size()), "moved mesh",
                    fmt::format("{}, one for every vertex of the mesh", positions_.size()));
   }
-  Vec3 lower = Vec3::Constant(infinity);
-  Vec3 upper = Vec3::Constant(-infinity);
+  Box bounds;
   bool in_range = true;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const Vec3 at = positions[i].array() + 0.0;
     positions_[i] = at;
-    lower = lower.cwiseMin(at);
-    upper = upper.cwiseMax(at);
-    in_range = in_range && std::abs(at.x()) <= largest_coordinate && std::abs(at.y()) <= largest_coordinate &&
-               std::abs(at.z()) <= largest_coordinate;
+    bounds.include(at);
+    in_range = in_range && (at.array().abs() <= largest_coordinate).all();
   }
-  bounds_ = {lower, upper};
+  bounds_ = bounds;
   return in_range ? success() : scale_positions(positions_, 1.0);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -73,6 +74,11 @@ class TriangleMesh {
     const Triangle& t = triangles_[face];
     return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
   }
+  /// Which of a triangle's corners a vertex of it is. [any]
+  [[nodiscard]] std::size_t corner_of(std::uint32_t face, std::uint32_t vertex) const noexcept {
+    const Triangle& t = triangles_[face];
+    return t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+  }
   /// Unit face normal, computed from the corners (right-hand rule). [servo]
   [[nodiscard]] Vec3 face_normal(std::uint32_t face) const noexcept;
   /// Unit vertex normal, weighted by the angles of the incident triangles. [servo]
@@ -142,12 +148,7 @@ class TriangleMesh {
 
 /// Whether two triangles have a corner in common. [servo]
 inline bool share_vertex(const TriangleMesh::Triangle& a, const TriangleMesh::Triangle& b) noexcept {
-  for (const std::uint32_t i : a) {
-    for (const std::uint32_t j : b) {
-      if (i == j) return true;
-    }
-  }
-  return false;
+  return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
 }
 
 /// Calls `visit(face)` once for every triangle that shares at least one vertex with `face`, itself included:
@@ -158,13 +159,9 @@ void for_each_adjoining_face(const TriangleMesh& mesh, std::uint32_t face, Visit
   for (int k = 0; k < 3; ++k) {
     for (const std::uint32_t other : mesh.faces_of_vertex(corners[static_cast<std::size_t>(k)])) {
       // A face that shares two vertices is listed by both: take it at the first shared corner only.
-      bool seen = false;
-      for (int j = 0; j < k && !seen; ++j) {
-        const TriangleMesh::Triangle& t = mesh.triangles()[other];
-        const std::uint32_t earlier = corners[static_cast<std::size_t>(j)];
-        seen = t[0] == earlier || t[1] == earlier || t[2] == earlier;
-      }
-      if (!seen) visit(other);
+      const TriangleMesh::Triangle& t = mesh.triangles()[other];
+      if (std::find_first_of(corners.begin(), corners.begin() + k, t.begin(), t.end()) == corners.begin() + k)
+        visit(other);
     }
   }
 }

@@ -1,6 +1,5 @@
 #include "asperity/geometry/mesh_refitter.h"
 
-#include <algorithm>
 #include <atomic>
 
 #include "asperity/core/parallel_for.h"

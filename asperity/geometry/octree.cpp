@@ -1,7 +1,6 @@
 #include "asperity/geometry/octree.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace asperity {
 namespace {
@@ -14,56 +13,7 @@ double squared_distance(const Box& box, const Vec3& p) noexcept {
   return outside.squaredNorm();
 }
 
-/// Where the line enters and leaves a box. Widened by the rounding of the divisions, so that it never misses.
-class SlabTest {
- public:
-  SlabTest(const Segment& segment, double margin) noexcept
-      : from_(segment.from), direction_(segment.to - segment.from), margin_(margin) {}
-
-  /// Entry t in [0, 1], or infinity if the box is passed by or lies beyond `limit`.
-  [[nodiscard]] double entry(const Box& box, double limit) const noexcept {
-    double enter = 0.0;
-    double leave = limit;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double to_lower = box.lower[axis] - margin_ - from_[axis];
-      const double to_upper = box.upper[axis] + margin_ - from_[axis];
-      if (direction_[axis] == 0.0) {
-        if (to_lower > 0.0 || to_upper < 0.0) return infinity;
-        continue;
-      }
-      const double t_lower = to_lower / direction_[axis];
-      const double t_upper = to_upper / direction_[axis];
-      enter = std::max(enter, std::min(t_lower, t_upper));
-      leave = std::min(leave, std::max(t_lower, t_upper));
-    }
-    return enter * (1.0 - rounding_of_magnitude) > leave * (1.0 + rounding_of_magnitude) ? infinity : enter;
-  }
-
- private:
-  Vec3 from_;
-  Vec3 direction_;
-  double margin_;
-};
-
 }  // namespace
-
-class TriangleOctree::Pending {
- public:
-  [[nodiscard]] bool empty() const noexcept { return top_ == 0; }
-  void start_family() noexcept { family_ = top_; }
-  /// Keeps the current family sorted, the smallest key on top.
-  void push(const Visit& visit) noexcept {
-    std::size_t slot = top_++;
-    for (; slot > family_ && stack_[slot - 1].key < visit.key; --slot) stack_[slot] = stack_[slot - 1];
-    stack_[slot] = visit;
-  }
-  [[nodiscard]] Visit pop() noexcept { return stack_[--top_]; }
-
- private:
-  std::array<Visit, stack_capacity> stack_;  // NOLINT: filled as it grows
-  std::size_t top_ = 0;
-  std::size_t family_ = 0;
-};
 
 class TriangleOctree::Builder {
  public:
@@ -149,72 +99,54 @@ TriangleOctree TriangleOctree::build(const TriangleMesh& mesh, const OctreeSetti
 
 ClosestHit TriangleOctree::closest(const Vec3& p, double bound) const noexcept {
   ClosestHit best;
-  if (nodes_.empty() || !(bound >= 0.0)) return best;
+  if (!(bound >= 0.0)) return best;
   // Cells are grown by the rounding of the distances that they are compared with, so that no nearest triangle is lost.
   const double margin = rounding_of_magnitude * (magnitude_ + p.cwiseAbs().maxCoeff());
   double limit = bound * bound;
-  Pending pending;
-  pending.start_family();
-  pending.push({0, squared_distance(root_.grown(margin), p), root_.lower, root_.upper});
-  while (!pending.empty()) {
-    const Visit visit = pending.pop();
-    if (visit.key > limit) continue;
-    const Node& node = nodes_[visit.node];
-    if (node.count == inner_node) {
-      const Vec3 centre = visit.cell().centre();
-      pending.start_family();
-      for (unsigned octant = 0; octant < 8; ++octant) {
-        if (nodes_[node.first + octant].count == 0) continue;
-        const Box cell = child_cell(visit.cell(), centre, octant);
-        const double key = squared_distance(cell.grown(margin), p);
-        if (key <= limit) pending.push({node.first + octant, key, cell.lower, cell.upper});
-      }
-      continue;
-    }
-    for (std::uint32_t i = 0; i < node.count; ++i) {
-      const std::uint32_t face = faces_[node.first + i];
-      const auto [a, b, c] = mesh_->corners(face);
-      const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
-      // Written so that not-a-number is refused.
-      if (!(point.squared_distance <= limit && point.squared_distance < best.point.squared_distance)) continue;
-      best = {face, point};
-      limit = point.squared_distance;
-    }
-  }
+  // Written so that not-a-number is refused.
+  walk([&](const Box& cell) { return squared_distance(cell.grown(margin), p); },
+       [&](double key) { return !(key <= limit); },
+       [&](std::uint32_t face) {
+         const auto [a, b, c] = mesh_->corners(face);
+         const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
+         if (!(point.squared_distance <= limit && point.squared_distance < best.point.squared_distance)) return;
+         best = {face, point};
+         limit = point.squared_distance;
+       });
   return best;
 }
 
 FirstHit TriangleOctree::first_hit(const Segment& segment) const noexcept {
   FirstHit best;
-  if (nodes_.empty()) return best;
+  const Vec3 direction = segment.to - segment.from;
   const double reach = std::max(segment.from.cwiseAbs().maxCoeff(), segment.to.cwiseAbs().maxCoeff());
-  const SlabTest slabs(segment, rounding_of_magnitude * (magnitude_ + reach));
-  Pending pending;
-  pending.start_family();
-  if (const double entry = slabs.entry(root_, 1.0); entry <= 1.0) pending.push({0, entry, root_.lower, root_.upper});
-  while (!pending.empty()) {
-    const Visit visit = pending.pop();
-    if (visit.key * (1.0 - rounding_of_magnitude) > best.t) continue;
-    const Node& node = nodes_[visit.node];
-    if (node.count == inner_node) {
-      const Vec3 centre = visit.cell().centre();
-      pending.start_family();
-      for (unsigned octant = 0; octant < 8; ++octant) {
-        if (nodes_[node.first + octant].count == 0) continue;
-        const Box cell = child_cell(visit.cell(), centre, octant);
-        const double entry = slabs.entry(cell, best.t);
-        if (entry <= 1.0) pending.push({node.first + octant, entry, cell.lower, cell.upper});
+  const double margin = rounding_of_magnitude * (magnitude_ + reach);
+  // Widened by the rounding of the divisions, so that no cell is missed.
+  const auto entry = [&](const Box& cell) {
+    double enter = 0.0;
+    double leave = best.t;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double to_lower = cell.lower[axis] - margin - segment.from[axis];
+      const double to_upper = cell.upper[axis] + margin - segment.from[axis];
+      if (direction[axis] == 0.0) {
+        if (to_lower > 0.0 || to_upper < 0.0) return infinity;
+        continue;
       }
-      continue;
+      const double t_lower = to_lower / direction[axis];
+      const double t_upper = to_upper / direction[axis];
+      enter = std::max(enter, std::min(t_lower, t_upper));
+      leave = std::min(leave, std::max(t_lower, t_upper));
     }
-    for (std::uint32_t i = 0; i < node.count; ++i) {
-      const std::uint32_t face = faces_[node.first + i];
-      const auto [a, b, c] = mesh_->corners(face);
-      double t = 1.0;
-      if (!segment_triangle_intersection(segment, a, b, c, t)) continue;
-      if (t < best.t || best.face == no_index) best = {face, t};
-    }
-  }
+    return enter * (1.0 - rounding_of_magnitude) > leave * (1.0 + rounding_of_magnitude) ? infinity : enter;
+  };
+  walk(
+      entry, [&](double key) { return !(key <= 1.0 && key * (1.0 - rounding_of_magnitude) <= best.t); },
+      [&](std::uint32_t face) {
+        const auto [a, b, c] = mesh_->corners(face);
+        double t = 1.0;
+        if (!segment_triangle_intersection(segment, a, b, c, t)) return;
+        if (t < best.t || best.face == no_index) best = {face, t};
+      });
   return best;
 }
 

@@ -65,15 +65,15 @@ class TriangleOctree {
     double key;
     Vec3 lower;
     Vec3 upper;
-    [[nodiscard]] Box cell() const noexcept { return {lower, upper}; }
   };
-  /// Fixed-size stack of the nodes still to visit, the nearest of each family on top.
-  class Pending;
   class Builder;
 
+  /// Calls leaf(face) for the faces of every leaf that is not beyond, of each family of cells the nearest first:
+  /// key(cell) answers how far away it is, beyond(key) whether that is farther than anything that is still wanted.
+  template <class Key, class Beyond, class Leaf>
+  void walk(const Key& key, const Beyond& beyond, const Leaf& leaf) const;
   /// Child `octant` of a cell: bit 0 is the upper half in x, bit 1 in y, bit 2 in z.
   static Box child_cell(const Box& cell, const Vec3& centre, unsigned octant) noexcept;
-  static bool meet(const Box& a, const Box& b) noexcept;
   [[nodiscard]] Box bounds_of(std::uint32_t face) const noexcept;
 
   const TriangleMesh* mesh_ = nullptr;
@@ -91,38 +91,48 @@ inline Box TriangleOctree::child_cell(const Box& cell, const Vec3& centre, unsig
   return child;
 }
 
-inline bool TriangleOctree::meet(const Box& a, const Box& b) noexcept {
-  return (a.lower.array() <= b.upper.array()).all() && (b.lower.array() <= a.upper.array()).all();
-}
-
 inline Box TriangleOctree::bounds_of(std::uint32_t face) const noexcept {
   const auto [a, b, c] = mesh_->corners(face);
   return {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};
 }
 
-template <class Visitor>
-void TriangleOctree::for_each_in_box(const Box& box, Visitor&& visit) const {
-  if (nodes_.empty() || !meet(root_, box)) return;
+template <class Key, class Beyond, class Leaf>
+void TriangleOctree::walk(const Key& key, const Beyond& beyond, const Leaf& leaf) const {
+  if (nodes_.empty()) return;
   std::array<Visit, stack_capacity> stack;  // NOLINT: filled as it grows
   std::size_t top = 0;
-  stack[top++] = {0, 0.0, root_.lower, root_.upper};
+  std::size_t family = 0;
+  const auto push = [&](std::uint32_t node, const Box& cell) {
+    const double away = key(cell);
+    if (beyond(away)) return;
+    std::size_t slot = top++;
+    for (; slot > family && stack[slot - 1].key < away; --slot) stack[slot] = stack[slot - 1];
+    stack[slot] = {node, away, cell.lower, cell.upper};
+  };
+  push(0, root_);
   while (top > 0) {
-    const Visit waiting = stack[--top];
-    const Node& node = nodes_[waiting.node];
+    const Visit visit = stack[--top];
+    if (beyond(visit.key)) continue;
+    const Node& node = nodes_[visit.node];
     if (node.count != inner_node) {
-      for (std::uint32_t i = 0; i < node.count; ++i) {
-        const std::uint32_t face = faces_[node.first + i];
-        if (meet(bounds_of(face), box)) visit(face);
-      }
+      for (std::uint32_t i = 0; i < node.count; ++i) leaf(faces_[node.first + i]);
       continue;
     }
-    const Vec3 centre = waiting.cell().centre();
+    family = top;
+    const Box cell{visit.lower, visit.upper};
+    const Vec3 centre = cell.centre();
     for (unsigned octant = 0; octant < 8; ++octant) {
-      if (nodes_[node.first + octant].count == 0) continue;
-      const Box cell = child_cell(waiting.cell(), centre, octant);
-      if (meet(cell, box)) stack[top++] = {node.first + octant, 0.0, cell.lower, cell.upper};
+      if (nodes_[node.first + octant].count != 0) push(node.first + octant, child_cell(cell, centre, octant));
     }
   }
+}
+
+template <class Visitor>
+void TriangleOctree::for_each_in_box(const Box& box, Visitor&& visit) const {
+  walk([&](const Box& cell) { return cell.overlaps(box) ? 0.0 : infinity; }, [](double key) { return key > 0.0; },
+       [&](std::uint32_t face) {
+         if (bounds_of(face).overlaps(box)) visit(face);
+       });
 }
 
 }  // namespace asperity

@@ -233,13 +233,13 @@ ASPERITY_AVX2 void avx2_triangles(const TrianglesOf8& triangles, const float poi
 }  // namespace
 
 const SearchKernels& plain_kernels() noexcept {
-  static constexpr SearchKernels kernels{"plain", plain_boxes, plain_cylinders, plain_ray, plain_triangles};
+  static constexpr SearchKernels kernels{plain_boxes, plain_cylinders, plain_ray, plain_triangles};
   return kernels;
 }
 
 const SearchKernels& best_kernels() noexcept {
 #if defined(__x86_64__)
-  static constexpr SearchKernels avx2{"avx2", avx2_boxes, avx2_cylinders, avx2_ray, avx2_triangles};
+  static constexpr SearchKernels avx2{avx2_boxes, avx2_cylinders, avx2_ray, avx2_triangles};
   static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (supported) return avx2;
 #endif

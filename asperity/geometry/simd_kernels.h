@@ -3,14 +3,43 @@
 // Each exists twice: plain C++, the oracle and the fallback, and AVX2, chosen once by what the processor has.
 // Results are single precision and only ever used to discard; what remains is decided in double precision.
 
-#include <cstdint>
+#include <algorithm>
+#include <cstddef>
 
 namespace asperity {
+
+/// A box in single precision; empty until it includes something.
+struct FloatBox {
+  float lower[3] = {1e30F, 1e30F, 1e30F};
+  float upper[3] = {-1e30F, -1e30F, -1e30F};
+
+  void include(const float low[3], const float high[3]) noexcept {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis] = std::min(lower[axis], low[axis]);
+      upper[axis] = std::max(upper[axis], high[axis]);
+    }
+  }
+  void include(const FloatBox& other) noexcept { include(other.lower, other.upper); }
+  /// Half of its surface; 0 where it is empty.
+  [[nodiscard]] float area() const noexcept {
+    const float x = upper[0] - lower[0];
+    const float y = upper[1] - lower[1];
+    const float z = upper[2] - lower[2];
+    return x < 0.0F ? 0.0F : x * y + y * z + z * x;
+  }
+};
 
 /// Eight boxes side by side. An empty slot has lower = +inf, upper = -inf.
 struct alignas(32) BoxesOf8 {
   float lower[3][8];
   float upper[3][8];
+
+  void set(std::size_t slot, const FloatBox& box) noexcept {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis][slot] = box.lower[axis];
+      upper[axis][slot] = box.upper[axis];
+    }
+  }
 };
 
 /// Eight flat cylinders side by side: the set of points within `radius` of an axis and `half_height` of its middle.
@@ -38,7 +67,6 @@ struct alignas(32) DistancesOf8 {
 
 /// One implementation of the inner loops. All functions are pure. [servo]
 struct SearchKernels {
-  const char* name;
   /// Squared distances (m²) from `point` to eight boxes; answers a bit mask of those <= `bound`.
   unsigned (*boxes)(const BoxesOf8& boxes, const float point[3], float bound, float squared[8]) noexcept;
   /// Bit mask of the cylinders that come within `bound` (m) of `point`.

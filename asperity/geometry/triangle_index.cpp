@@ -15,32 +15,6 @@ constexpr double patch_slack_in_edges = 4.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
 
-void gather_from(const Bvh& bvh, const Vec3& centre, double reach, std::uint64_t owner, TrianglePatch& patch) noexcept {
-  bvh.gather(centre, reach, owner, patch);
-}
-
-// The octree keeps to the papers and has no gathering of its own: an empty certificate sends every query to the tree.
-void gather_from(const TriangleOctree&, const Vec3& centre, double, std::uint64_t owner,
-                 TrianglePatch& patch) noexcept {
-  patch.owner = owner;
-  patch.centre = centre;
-  patch.certified = 0.0;
-  patch.count = 0;
-}
-
-template <class Visit>
-void along(const Bvh& bvh, const Segment& motion, double radius, Visit&& visit) noexcept {
-  bvh.for_each_along(motion, radius, visit);
-}
-
-template <class Visit>
-void along(const TriangleOctree& octree, const Segment& motion, double radius, Visit&& visit) noexcept {
-  Box box;
-  box.include(motion.from);
-  box.include(motion.to);
-  octree.for_each_in_box(box.grown(radius), [&](std::uint32_t face) { visit(face); });
-}
-
 }  // namespace
 
 TriangleIndex::TriangleIndex(std::shared_ptr<const Inside> inside, std::uint64_t lineage)
@@ -116,8 +90,12 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
-  std::visit([&](const auto& structure) { gather_from(structure, centre, reach, identity_, patch); },
-             inside_->structure);
+  if (const Bvh* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->gather(centre, reach, identity_, patch);
+  // The octree keeps to the papers and has no gathering of its own: an empty certificate sends every query to the tree.
+  patch.owner = identity_;
+  patch.centre = centre;
+  patch.certified = 0.0;
+  patch.count = 0;
 }
 
 bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& patch) const noexcept {
@@ -128,12 +106,6 @@ bool TriangleIndex::ensure(const Vec3& position, double reach, TrianglePatch& pa
   if (patch.owner == identity_ && patch.certified < reach && (position - patch.centre).norm() < edge) return false;
   gather(position, reach + patch_slack_in_edges * edge, patch);
   return patch.covers(identity_, position, reach);
-}
-
-void TriangleIndex::sweep_face(std::uint32_t face, const Segment& motion, double radius, Sides sides,
-                               SweptHit& best) const noexcept {
-  const auto [a, b, c] = mesh().corners(face);
-  sweep_triangle(face, a, b, c, motion, radius, sides, tolerance_, best);
 }
 
 template <class Visit>
@@ -197,15 +169,13 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
   const double blocked = radius + blocked_in_skins * tolerance_.skin;
   SweptHit best;
   if (length == 0.0) return best;
+  const auto sweep_face = [&](std::uint32_t face) {
+    const auto [a, b, c] = mesh().corners(face);
+    sweep_triangle(face, a, b, c, motion, radius, sides, tolerance_, best);
+    return best.t;
+  };
   if (length > long_motion_in_edges * mesh().mean_edge()) {
-    std::visit(
-        [&](const auto& structure) {
-          along(structure, motion, grown, [&](std::uint32_t face) {
-            sweep_face(face, motion, radius, sides, best);
-            return best.t;
-          });
-        },
-        inside_->structure);
+    for_each_along(motion, grown, sweep_face);
     return best;
   }
   const double touch = radius + touch_in_skins * tolerance_.skin;
@@ -226,7 +196,7 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
     const double bound =
         distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
     if (bound > touch) return;
-    if (bound <= grown && !resting_on(face)) sweep_face(face, motion, radius, sides, best);
+    if (bound <= grown && !resting_on(face)) sweep_face(face);
     all_near_end = near_end.push_back(face) && all_near_end;
   });
   if (!best.hit && all_near_end) {

@@ -75,19 +75,12 @@ Moments joined(const Moments& a, const Moments& b) {
   return sum;
 }
 
-/// Which coefficient of a homogeneous polynomial in x, y, z the product of these coordinates belongs to.
-std::size_t quadratic_index(int i, int j) {
-  static constexpr std::size_t index[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-  return index[i][j];
-}
-std::size_t cubic_index(int i, int j, int k) {
-  std::array<int, 3> sorted = {i, j, k};
-  std::sort(sorted.begin(), sorted.end());
-  static constexpr std::size_t first_with[3] = {0, 6, 9};
-  static constexpr std::size_t behind[3][3][3] = {
-      {{0, 1, 2}, {0, 3, 4}, {0, 0, 5}}, {{}, {0, 0, 1}, {0, 0, 2}}, {{}, {}, {0, 0, 0}}};
-  const auto [a, b, c] = sorted;
-  return first_with[a] + behind[a][b][c];
+/// Which coefficient of a homogeneous polynomial in x, y, z the product of these coordinates belongs to: ordered by how
+/// many of them are not x, then by how many are z.
+template <class... Axes>
+std::size_t product_index(Axes... axes) {
+  const int others = (... + (axes > 0 ? 1 : 0));
+  return static_cast<std::size_t>(others * (others + 1) / 2 + (... + (axes == 2 ? 1 : 0)));
 }
 
 /// With r = x - p, R = |r|, u = r / R the kernel r / R³ has the derivatives (I - 3 u u) / R³ and
@@ -95,8 +88,8 @@ std::size_t cubic_index(int i, int j, int k) {
 std::array<double, 6> quadrupole_of(const Mat3& first) {
   std::array<double, 6> coefficients{};
   for (int i = 0; i < 3; ++i) {
-    coefficients[quadratic_index(i, i)] += first.trace();
-    for (int j = 0; j < 3; ++j) coefficients[quadratic_index(i, j)] -= 3.0 * first(i, j);
+    coefficients[product_index(i, i)] += first.trace();
+    for (int j = 0; j < 3; ++j) coefficients[product_index(i, j)] -= 3.0 * first(i, j);
   }
   return coefficients;
 }
@@ -108,9 +101,9 @@ std::array<double, 10> octupole_of(const std::array<Mat3, 3>& second) {
     double linear = moment.trace();
     for (int j = 0; j < 3; ++j) {
       linear += 2.0 * second[static_cast<std::size_t>(j)](j, i);
-      for (int k = 0; k < 3; ++k) coefficients[cubic_index(i, j, k)] += 15.0 * moment(j, k);
+      for (int k = 0; k < 3; ++k) coefficients[product_index(i, j, k)] += 15.0 * moment(j, k);
     }
-    for (int j = 0; j < 3; ++j) coefficients[cubic_index(i, j, j)] -= 3.0 * linear;
+    for (int j = 0; j < 3; ++j) coefficients[product_index(i, j, j)] -= 3.0 * linear;
   }
   return coefficients;
 }

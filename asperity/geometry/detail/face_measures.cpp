@@ -139,8 +139,17 @@ ASPERITY_INLINE void measure_four(const Vec3* positions, const Triangle* const* 
   keep_smaller(totals.sound, longest > 1.1e-120 ? areal : zero);
 }
 
+ASPERITY_INLINE void normalize_all(const NormalSums& sums, std::vector<Vec3f>& normals) {
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double squared = sums[i].squaredNorm();
+    // Triangles that face each other can cancel.
+    const double per = squared > 1e-18 ? 1.0 / std::sqrt(squared) : 0.0;
+    normals[i] = (per * sums[i]).cast<float>();
+  }
+}
+
 ASPERITY_INLINE void measure_all(std::span<const Vec3> positions, std::span<const Triangle> triangles,
-                                 const Vec3& centre, NormalSums& sums, Totals& totals) {
+                                 const Vec3& centre, NormalSums& sums, std::vector<Vec3f>& normals, Totals& totals) {
   for (std::size_t first = 0; first < triangles.size(); first += lane_count) {
     const std::size_t count = std::min(lane_count, triangles.size() - first);
     const Triangle* faces[lane_count];
@@ -156,29 +165,18 @@ ASPERITY_INLINE void measure_all(std::span<const Vec3> positions, std::span<cons
       for (std::size_t k = 0; k < 3; ++k) sums[(*faces[i])[k]] += four.angle[k][i] * normal;
     }
   }
-}
-
-ASPERITY_INLINE void normalize_all(const NormalSums& sums, std::vector<Vec3f>& normals) {
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    const double squared = sums[i].squaredNorm();
-    // Triangles that face each other can cancel.
-    const double per = squared > 1e-18 ? 1.0 / std::sqrt(squared) : 0.0;
-    normals[i] = (per * sums[i]).cast<float>();
-  }
+  normalize_all(sums, normals);
 }
 
 void measure_plain(std::span<const Vec3> positions, std::span<const Triangle> triangles, const Vec3& centre,
                    NormalSums& sums, std::vector<Vec3f>& normals, Totals& totals) {
-  measure_all(positions, triangles, centre, sums, totals);
-  normalize_all(sums, normals);
+  measure_all(positions, triangles, centre, sums, normals, totals);
 }
-
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) void measure_avx2(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                                                   const Vec3& centre, NormalSums& sums, std::vector<Vec3f>& normals,
                                                   Totals& totals) {
-  measure_all(positions, triangles, centre, sums, totals);
-  normalize_all(sums, normals);
+  measure_all(positions, triangles, centre, sums, normals, totals);
 }
 #endif
 
@@ -201,14 +199,11 @@ FaceMeasures measure_faces(std::span<const Vec3> positions, std::span<const Tria
   Totals totals;
 #if defined(__x86_64__)
   static const bool wide = __builtin_cpu_supports("avx2");
-  if (wide) {
-    measure_avx2(positions, triangles, centre, sums, normals, totals);
-  } else {
-    measure_plain(positions, triangles, centre, sums, normals, totals);
-  }
+  const auto measure = wide ? measure_avx2 : measure_plain;
 #else
-  measure_plain(positions, triangles, centre, sums, normals, totals);
+  const auto measure = measure_plain;
 #endif
+  measure(positions, triangles, centre, sums, normals, totals);
   FaceMeasures measures;
   measures.area = sum_of(totals.area);
   measures.signed_volume = sum_of(totals.volume);
