@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 #include "asperity/core/suggest.h"
@@ -13,30 +12,6 @@
 namespace asperity {
 
 namespace {
-
-struct KindEntry {
-  FrictionKind kind;
-  std::vector<std::string> parameters;
-};
-
-const std::array<KindEntry, 7>& kinds() {
-  static const std::array<KindEntry, 7> entries{{
-      {FrictionKind::implicit_coulomb, {"stiffness", "damping", "break_away"}},
-      {FrictionKind::viscous, {"viscosity"}},
-      {FrictionKind::coulomb, {"viscosity", "stick_speed"}},
-      {FrictionKind::karnopp, {"stiffness", "damping", "viscosity", "break_away", "stick_speed"}},
-      {FrictionKind::dahl, {"stiffness", "exponent"}},
-      {FrictionKind::hayward_armstrong, {"stiffness", "adhesion"}},
-      {FrictionKind::lugre, {"stiffness", "damping", "viscosity", "break_away", "stribeck_speed"}},
-  }};
-  return entries;
-}
-
-const KindEntry& entry_of(FrictionKind kind) {
-  for (const KindEntry& entry : kinds())
-    if (entry.kind == kind) return entry;
-  return kinds().front();
-}
 
 struct Parameter {
   const char* name;
@@ -74,16 +49,23 @@ const std::vector<std::string>& friction_names() {
 Result<FrictionKind> friction_by_name(std::string_view name) {
   if (const std::optional<FrictionKind> kind = value_named<FrictionKind>(name)) return *kind;
   const std::string near = nearest_name(name, friction_names());
-  return Error{
-      ErrorCode::bad_value,
+  return bad_value(
       fmt::format("\"{}\" is no friction law{}", name, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-      {},
-      {},
-      listed(friction_names())};
+      {}, listed(friction_names()));
 }
 
 const std::vector<std::string>& friction_parameters(FrictionKind kind) {
-  return entry_of(kind).parameters;
+  static const std::vector<std::string> of_kind[] = {
+      {"stiffness", "damping", "break_away"},                                 // implicit_coulomb
+      {"viscosity"},                                                          // viscous
+      {"viscosity", "stick_speed"},                                           // coulomb
+      {"stiffness", "damping", "viscosity", "break_away", "stick_speed"},     // karnopp
+      {"stiffness", "exponent"},                                              // dahl
+      {"stiffness", "adhesion"},                                              // hayward_armstrong
+      {"stiffness", "damping", "viscosity", "break_away", "stribeck_speed"},  // lugre
+  };
+  const auto place = static_cast<std::size_t>(kind);
+  return of_kind[place < std::size(of_kind) ? place : 0];
 }
 
 Status validate(const FrictionLaw& law) {
