@@ -109,14 +109,13 @@ TEST_P(Agreement, AConsistentPairGivesNoWarningAndItsScale) {
   EXPECT_GT(agreement.correlation, 0.98);
   EXPECT_NEAR(agreement.scale, 1.0, 0.05);
   EXPECT_LT(agreement.rms_angle, 0.02);
-  EXPECT_NEAR(implied_amplitude(agreement, amplitude).value_or(0.0), amplitude, 0.05 * amplitude);
 }
 
 TEST_P(Agreement, AnotherHeightScaleIsNoDisagreementButIsReported) {
   const NormalAgreement agreement = compare(2.5, false, GreenConvention::up);
   EXPECT_FALSE(disagreement_warning(agreement).has_value());
+  EXPECT_GE(agreement.correlation, 0.5);
   EXPECT_NEAR(agreement.scale, 2.5, 0.15);
-  EXPECT_NEAR(implied_amplitude(agreement, amplitude).value_or(0.0), 2.5 * amplitude, 0.15 * amplitude);
 }
 
 TEST_P(Agreement, TheWrongGreenConventionIsNamed) {
@@ -131,7 +130,7 @@ TEST_P(Agreement, TheWrongGreenConventionIsNamed) {
 TEST_P(Agreement, InvertedHeightsAreNamed) {
   const NormalAgreement agreement = compare(1.0, true, GreenConvention::up);
   EXPECT_FALSE(agreement.green_flipped_fits_better);
-  EXPECT_FALSE(implied_amplitude(agreement, amplitude).has_value());
+  EXPECT_LT(agreement.correlation, 0.5);
   const auto warning = disagreement_warning(agreement);
   ASSERT_TRUE(warning.has_value());
   EXPECT_NE(warning->find("white_is"), std::string::npos) << *warning;

@@ -374,7 +374,8 @@ TEST(RealMaps, PairsAgreeAndEachWrongSettingGetsItsHint) {
     std::printf("%-32s correlation %.3f (%.3f along s, %.3f along t), scale %.3f, blocks of %d\n", pair.heights,
                 right.correlation, right.correlation_s, right.correlation_t, right.scale, right.block);
     EXPECT_FALSE(disagreement_warning(right).has_value()) << *disagreement_warning(right);
-    EXPECT_GT(implied_amplitude(right, 1e-3).value_or(0.0), 0.0);
+    EXPECT_GE(right.correlation, 0.5);
+    EXPECT_GT(right.scale, 0.0);
 
     const auto green = disagreement_warning(compare(heights, normals, pair.white_is_deep, GreenConvention::down));
     ASSERT_TRUE(green.has_value());

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <type_traits>
 
 namespace asperity {
 namespace {
@@ -37,7 +36,7 @@ Error at_byte(ErrorCode code, std::string what, const std::string& file, std::ui
 /// A header's bytes, taken from the front.
 class Cursor {
  public:
-  Cursor(const std::string& bytes, std::size_t at) : bytes_(bytes), at_(at) {}
+  Cursor(const std::string& bytes, std::size_t at, const std::string& file) : bytes_(bytes), at_(at), file_(file) {}
 
   template <class Number>
   Number take() {
@@ -52,10 +51,15 @@ class Cursor {
   }
   [[nodiscard]] bool has(std::uint64_t count) const { return count <= bytes_.size() - at_; }
   [[nodiscard]] std::size_t at() const { return at_; }
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] Error malformed(std::string what, std::size_t byte, std::string accepted) const {
+    return at_byte(ErrorCode::file_malformed, std::move(what), file_, byte, std::move(accepted));
+  }
 
  private:
   const std::string& bytes_;
   std::size_t at_;
+  const std::string& file_;
 };
 
 Status read_all(int descriptor, const std::string& name, std::uint64_t from, char* to, std::size_t count) {
@@ -123,24 +127,23 @@ Status check_sizes(const BrickFilePrefix& prefix, std::uint64_t length, const st
   return success();
 }
 
-Result<GridAxes> read_axes(Cursor& cursor, const std::string& file) {
+Result<GridAxes> read_axes(Cursor& cursor) {
   const std::size_t counts_at = cursor.at();
-  if (!cursor.has(level_bytes))
-    return at_byte(ErrorCode::file_malformed, "has a level without axes", file, counts_at, "three node counts");
+  if (!cursor.has(level_bytes)) return cursor.malformed("has a level without axes", counts_at, "three node counts");
   std::array<std::uint32_t, 3> counts{};
   for (std::uint32_t& count : counts) count = cursor.take<std::uint32_t>();
   GridAxes axes;
   for (std::size_t a = 0; a < 3; ++a) {
     const std::size_t from = cursor.at();
     if (!cursor.has(sizeof(double) * std::uint64_t{counts[a]}))
-      return at_byte(ErrorCode::file_malformed, fmt::format("has an axis of {} nodes", counts[a]), file,
-                     counts_at + 4 * a, "as many as its header holds");
+      return cursor.malformed(fmt::format("has an axis of {} nodes", counts[a]), counts_at + 4 * a,
+                              "as many as its header holds");
     std::vector<double> nodes(counts[a]);
     for (double& node : nodes) node = cursor.take<double>();
     Result<GridAxis> axis = GridAxis::build(std::move(nodes));
     if (!axis) {
-      return at_byte(ErrorCode::file_malformed, fmt::format("has a bad {} axis: {}", "xyz"[a], axis.error().what), file,
-                     from, axis.error().accepted);
+      return cursor.malformed(fmt::format("has a bad {} axis: {}", "xyz"[a], axis.error().what), from,
+                              axis.error().accepted);
     }
     axes[a] = std::move(*axis);
   }
@@ -152,29 +155,29 @@ bool same_nodes(const GridAxis& a, const GridAxis& b) {
 }
 
 /// Everything after the prefix. Its sizes have been checked, so that nothing here outgrows the file.
-Status read_tables(Cursor& cursor, const BrickFilePrefix& prefix, const std::string& file, BrickFileHeader& header) {
+Status read_tables(Cursor& cursor, const BrickFilePrefix& prefix, BrickFileHeader& header) {
   header.name = cursor.text(prefix.name_bytes);
   for (std::uint32_t l = 0; l < prefix.levels; ++l) {
     const std::size_t from = cursor.at();
-    ASPERITY_TRY(GridAxes axes, read_axes(cursor, file));
+    ASPERITY_TRY(GridAxes axes, read_axes(cursor));
     if (l == 0) {
       Result<std::vector<BrickLevel>> levels = brick_levels(axes);
-      if (!levels) return std::move(levels).error().in_file(file);
+      if (!levels) return std::move(levels).error().in_file(cursor.file());
       header.levels = std::move(*levels);
       if (header.levels.size() != prefix.levels)
-        return at_byte(ErrorCode::file_malformed, fmt::format("has {} levels", prefix.levels), file,
-                       offsetof(BrickFilePrefix, levels), fmt::format("{} for its axes", header.levels.size()));
+        return cursor.malformed(fmt::format("has {} levels", prefix.levels), offsetof(BrickFilePrefix, levels),
+                                fmt::format("{} for its axes", header.levels.size()));
     }
     const GridAxes& expected = header.levels[l].axes;
     if (!same_nodes(axes[0], expected[0]) || !same_nodes(axes[1], expected[1]) || !same_nodes(axes[2], expected[2]))
-      return at_byte(ErrorCode::file_malformed, fmt::format("has a level {} of other axes", l), file, from,
-                     "every second node of the level below");
+      return cursor.malformed(fmt::format("has a level {} of other axes", l), from,
+                              "every second node of the level below");
   }
   const BrickLevel& last = header.levels.back();
   const std::uint64_t bricks = std::uint64_t{last.first} + last.count();
   if (bricks != prefix.bricks || !cursor.has(record_bytes * bricks))
-    return at_byte(ErrorCode::file_malformed, fmt::format("has {} bricks", prefix.bricks), file,
-                   offsetof(BrickFilePrefix, bricks), fmt::format("{} for its axes", bricks));
+    return cursor.malformed(fmt::format("has {} bricks", prefix.bricks), offsetof(BrickFilePrefix, bricks),
+                            fmt::format("{} for its axes", bricks));
   const std::uint64_t stride = stride_of(header.type);
   header.bricks.resize(bricks);
   for (std::uint64_t n = 0; n < bricks; ++n) {
@@ -186,16 +189,16 @@ Status read_tables(Cursor& cursor, const BrickFilePrefix& prefix, const std::str
     record.checksum = cursor.take<std::uint64_t>();
     if (record.offset % brick_alignment != 0 || record.offset < brick_aligned(prefix.header_bytes) ||
         record.offset > header.file_bytes - stride)
-      return at_byte(ErrorCode::file_malformed, fmt::format("has brick {} at byte {}", n, record.offset), file, from,
-                     fmt::format("a multiple of {} within the file", brick_alignment));
+      return cursor.malformed(fmt::format("has brick {} at byte {}", n, record.offset), from,
+                              fmt::format("a multiple of {} within the file", brick_alignment));
     const ValueRange nothing;
     const bool known = std::isfinite(record.range.lower) && std::isfinite(record.range.upper) &&
                        record.range.lower <= record.range.upper;
     const bool unknown = record.range.lower == nothing.lower && record.range.upper == nothing.upper;
     if (!known && !unknown)
-      return at_byte(ErrorCode::file_malformed,
-                     fmt::format("has brick {} with values from {} to {}", n, record.range.lower, record.range.upper),
-                     file, from + 8, "finite numbers that do not decrease");
+      return cursor.malformed(
+          fmt::format("has brick {} with values from {} to {}", n, record.range.lower, record.range.upper), from + 8,
+          "finite numbers that do not decrease");
   }
   return success();
 }
@@ -242,7 +245,7 @@ Result<std::vector<BrickLevel>> brick_levels(const GridAxes& axes) {
     }
     first += count;
     if (first > (std::uint64_t{1} << 31U)) {
-      return Error{ErrorCode::too_large, "has more bricks than can be numbered", "", "", "at most 2^31 bricks"};
+      return refused(ErrorCode::too_large, "has more bricks than can be numbered", {}, "at most 2^31 bricks");
     }
     levels.push_back(std::move(level));
     if (count == 1) return levels;
@@ -324,13 +327,10 @@ Result<BrickFileHeader> read_brick_header(int descriptor, const std::string& nam
     return at_byte(ErrorCode::file_malformed, "has a damaged header: its checksum differs", name,
                    offsetof(BrickFilePrefix, checksum), "the file as it was written");
   }
-  BrickFileHeader header;
-  header.type = static_cast<SampleType>(prefix.type);
-  header.lowest = prefix.lowest;
-  header.highest = prefix.highest;
-  header.file_bytes = prefix.file_bytes;
-  Cursor cursor(bytes, sizeof prefix);
-  ASPERITY_CHECK(read_tables(cursor, prefix, name, header));
+  BrickFileHeader header{
+      static_cast<SampleType>(prefix.type), {}, prefix.lowest, prefix.highest, {}, {}, prefix.file_bytes};
+  Cursor cursor(bytes, sizeof prefix, name);
+  ASPERITY_CHECK(read_tables(cursor, prefix, header));
   return header;
 }
 

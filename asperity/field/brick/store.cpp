@@ -176,16 +176,14 @@ class Way {
   /// Bricks within `reach` of the way, and some more.
   [[nodiscard]] BrickBox around(std::size_t level, double reach) const {
     BrickBox out;
+    Box way;
+    for (const Vec3& q : points_[level]) way.include(q);
+    way = way.grown(reach);
     for (std::size_t a = 0; a < 3; ++a) {
-      double low = infinity;
-      double high = -infinity;
-      for (const Vec3& q : points_[level]) {
-        low = std::min(low, q[static_cast<Eigen::Index>(a)]);
-        high = std::max(high, q[static_cast<Eigen::Index>(a)]);
-      }
+      const auto at = static_cast<Eigen::Index>(a);
       const double last = header_->levels[level].bricks[a] - 1;
-      out.first[a] = static_cast<std::uint32_t>(std::clamp(std::floor(low - reach), 0.0, last));
-      out.last[a] = static_cast<std::uint32_t>(std::clamp(std::floor(high + reach), 0.0, last));
+      out.first[a] = static_cast<std::uint32_t>(std::clamp(std::floor(way.lower[at]), 0.0, last));
+      out.last[a] = static_cast<std::uint32_t>(std::clamp(std::floor(way.upper[at]), 0.0, last));
     }
     return out;
   }
@@ -243,163 +241,150 @@ struct BrickStore::State {
   std::thread streamer;
 
   [[nodiscard]] const BrickFileHeader& header() const noexcept { return pool->header(); }
-  void stream();
-  bool stream_once(const Way& way);
-  void list_missing(const Way& way, std::vector<Candidate>& missing) const;
-  bool make_room(const Way& way, double nearest_missing);
-  Status load(std::uint32_t brick);
-  Status fetch(const BrickLevel& level, const BrickBox& box, const Way& way);
-  bool wait_for_slot(const Way& way, const BrickLevel& level, const BrickBox& keep);
-  template <class Done>
-  bool patiently(const Done& done);
+
+  void stream() {
+    Vec3 position = Vec3::Zero();
+    Vec3 velocity = Vec3::Zero();
+    Motion motion;
+    std::optional<Way> done;
+    Clock::time_point done_at;
+    while (!stop.load(std::memory_order_relaxed)) {
+      if (target.read(position, velocity) != 0) {
+        motion.update(position, velocity);
+        const Way way(header(), motion);
+        const bool settled = done && way.like(*done) && Clock::now() - done_at < settled_time;
+        if (!settled) {
+          if (stream_once(way)) continue;
+          done = way;
+          done_at = Clock::now();
+        }
+      }
+      std::this_thread::sleep_for(poll_time);
+    }
+  }
+
+  Status fetch(const BrickLevel& level, const BrickBox& box, const Way& way) {
+    const auto full = [&] {
+      return Error{ErrorCode::too_large, "needs more bricks than the resident memory takes", pool->file(), "resident",
+                   "more memory, or a coarser level"};
+    };
+    std::uint64_t wanted = 1;
+    for (std::size_t a = 0; a < 3; ++a) wanted *= box.last[a] - box.first[a] + 1;
+    if (level.first < pool->first_pinned() && wanted > pool->slots()) return full();
+    Status outcome = success();
+    all_bricks(level, box, [&](std::uint32_t brick, const auto&) {
+      // A doomed one must be gone before it can come back.
+      const bool gone = pool->ready(brick) || patiently([&] { return !pool->here(brick); });
+      if (pool->ready(brick)) return true;
+      outcome = gone && wait_for_slot(way, level, box) ? load(brick) : Status(full());
+      return outcome.ok();
+    });
+    return outcome;
+  }
 
  private:
+  Status load(std::uint32_t brick) {
+    Status loaded = pool->load(brick);
+    damaged[brick] = !loaded;
+    if (!loaded && first_error) first_error = loaded;
+    return loaded;
+  }
+
+  /// Bricks that the way needs and that are not here, nearest first: coarser ones reach farther, since their distances
+  /// are measured in wider bricks.
+  void list_missing(const Way& way, std::vector<Candidate>& missing) const {
+    missing.clear();
+    const std::size_t levels = header().levels.size();
+    const double room = static_cast<double>(pool->slots()) / 2.0 / static_cast<double>(levels);
+    const double most = std::max(0.5 * (std::cbrt(room) - 1.0), least_reach);
+    const double speed = std::max(way.length() / horizon, 1e-9);
+    const double reach = std::clamp(reach_rate / speed, least_reach, most);
+    for (std::size_t l = 0; l < levels; ++l) {
+      const BrickLevel& level = header().levels[l];
+      if (level.first >= pool->first_pinned()) break;
+      all_bricks(level, way.around(l, reach), [&](std::uint32_t brick, const std::array<std::uint32_t, 3>& at) {
+        if (pool->ready(brick) || damaged[brick]) return true;
+        const double distance = way.distance(l, at);
+        if (distance < reach) missing.push_back({distance, brick});
+        return true;
+      });
+    }
+    std::sort(missing.begin(), missing.end(), nearer);
+  }
+
+  /// Dooms what is farthest from the way, a batch at a time, but nothing that is as near as what is missing. False
+  /// where there is nothing to gain.
+  bool make_room(const Way& way, double nearest_missing) {
+    constexpr double clearly = 0.1;
+    pool->list_evictable(evictable_);
+    leaving_.clear();
+    for (const std::uint32_t brick : evictable_) {
+      const double distance = way.distance(brick);
+      if (distance > nearest_missing + clearly) leaving_.push_back({distance, brick});
+    }
+    const std::size_t batch = std::min(std::max<std::size_t>(pool->slots() / 16, 4), leaving_.size());
+    std::partial_sort(leaving_.begin(), leaving_.begin() + static_cast<std::ptrdiff_t>(batch), leaving_.end(),
+                      [](const Candidate& a, const Candidate& b) { return nearer(b, a); });
+    for (std::size_t n = 0; n < batch; ++n) pool->doom(leaving_[n].brick);
+    return batch > 0;
+  }
+
+  /// Reads a few of the bricks that the way needs. False when nothing is left to do for now.
+  bool stream_once(const Way& way) {
+    const std::scoped_lock lock(filling);
+    pool->reclaim();
+    list_missing(way, missing_);
+    if (missing_.empty()) return false;
+    if (pool->free_slots() < burst && pool->retiring() == 0) make_room(way, missing_.front().distance);
+    // Usually no reader is inside, and both steps are taken at once.
+    pool->reclaim();
+    pool->reclaim();
+    // The disk is told of all of them at once: it answers several requests sooner than one after the other.
+    for (std::size_t n = 0; n < std::min(2 * burst, missing_.size()); ++n) pool->announce(missing_[n].brick);
+    std::size_t read = 0;
+    for (const Candidate& candidate : missing_) {
+      if (read == burst || pool->free_slots() == 0 || stop.load(std::memory_order_relaxed)) break;
+      if (pool->here(candidate.brick)) continue;  // on its way out: comes back once it is gone
+      // A brick that cannot be read is remembered and left out from here on.
+      if (load(candidate.brick)) ++read;
+    }
+    return read > 0;
+  }
+
+  /// Takes doomed bricks on until `done`. Readers leave within a tick: who stays for seconds never will.
+  template <class Done>
+  bool patiently(const Done& done) {
+    constexpr auto patience = std::chrono::seconds(2);
+    const Clock::time_point begin = Clock::now();
+    while (!done() && Clock::now() - begin < patience) {
+      pool->reclaim();
+      if (!done()) std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
+    return done();
+  }
+
+  /// Takes away what is farthest from the way and outside of `keep`, and waits until its slot is free.
+  bool wait_for_slot(const Way& way, const BrickLevel& level, const BrickBox& keep) {
+    pool->reclaim();
+    if (pool->free_slots() > 0) return true;
+    if (pool->retiring() == 0) {
+      pool->list_evictable(evictable_);
+      Candidate farthest{-1.0, no_index};
+      for (const std::uint32_t brick : evictable_) {
+        const bool kept = !all_bricks(level, keep, [&](std::uint32_t other, const auto&) { return other != brick; });
+        const double distance = kept ? -1.0 : way.distance(brick);
+        if (distance > farthest.distance) farthest = {distance, brick};
+      }
+      if (farthest.brick == no_index) return false;
+      pool->doom(farthest.brick);
+    }
+    return patiently([&] { return pool->free_slots() > 0; });
+  }
+
   std::vector<Candidate> missing_;
   std::vector<std::uint32_t> evictable_;
   std::vector<Candidate> leaving_;
 };
-
-Status BrickStore::State::load(std::uint32_t brick) {
-  Status loaded = pool->load(brick);
-  if (loaded) {
-    damaged[brick] = false;
-    return loaded;
-  }
-  damaged[brick] = true;
-  if (first_error) first_error = loaded;
-  return loaded;
-}
-
-/// Bricks that the way needs and that are not here, nearest first: coarser ones reach farther, since their distances
-/// are measured in wider bricks.
-void BrickStore::State::list_missing(const Way& way, std::vector<Candidate>& missing) const {
-  missing.clear();
-  const std::size_t levels = header().levels.size();
-  const double room = static_cast<double>(pool->slots()) / 2.0 / static_cast<double>(levels);
-  const double most = std::max(0.5 * (std::cbrt(room) - 1.0), least_reach);
-  const double speed = std::max(way.length() / horizon, 1e-9);
-  const double reach = std::clamp(reach_rate / speed, least_reach, most);
-  for (std::size_t l = 0; l < levels; ++l) {
-    const BrickLevel& level = header().levels[l];
-    if (level.first >= pool->first_pinned()) break;
-    all_bricks(level, way.around(l, reach), [&](std::uint32_t brick, const std::array<std::uint32_t, 3>& at) {
-      if (pool->ready(brick) || damaged[brick]) return true;
-      const double distance = way.distance(l, at);
-      if (distance < reach) missing.push_back({distance, brick});
-      return true;
-    });
-  }
-  std::sort(missing.begin(), missing.end(), nearer);
-}
-
-/// Dooms what is farthest from the way, a batch at a time, but nothing that is as near as what is missing. False where
-/// there is nothing to gain.
-bool BrickStore::State::make_room(const Way& way, double nearest_missing) {
-  constexpr double clearly = 0.1;
-  pool->list_evictable(evictable_);
-  leaving_.clear();
-  for (const std::uint32_t brick : evictable_) {
-    const double distance = way.distance(brick);
-    if (distance > nearest_missing + clearly) leaving_.push_back({distance, brick});
-  }
-  const std::size_t batch = std::min(std::max<std::size_t>(pool->slots() / 16, 4), leaving_.size());
-  std::partial_sort(leaving_.begin(), leaving_.begin() + static_cast<std::ptrdiff_t>(batch), leaving_.end(),
-                    [](const Candidate& a, const Candidate& b) { return nearer(b, a); });
-  for (std::size_t n = 0; n < batch; ++n) pool->doom(leaving_[n].brick);
-  return batch > 0;
-}
-
-/// Reads a few of the bricks that the way needs. False when nothing is left to do for now.
-bool BrickStore::State::stream_once(const Way& way) {
-  const std::scoped_lock lock(filling);
-  pool->reclaim();
-  list_missing(way, missing_);
-  if (missing_.empty()) return false;
-  if (pool->free_slots() < burst && pool->retiring() == 0) make_room(way, missing_.front().distance);
-  // Usually no reader is inside, and both steps are taken at once.
-  pool->reclaim();
-  pool->reclaim();
-  // The disk is told of all of them at once: it answers several requests sooner than one after the other.
-  for (std::size_t n = 0; n < std::min(2 * burst, missing_.size()); ++n) pool->announce(missing_[n].brick);
-  std::size_t read = 0;
-  for (const Candidate& candidate : missing_) {
-    if (read == burst || pool->free_slots() == 0 || stop.load(std::memory_order_relaxed)) break;
-    if (pool->here(candidate.brick)) continue;  // on its way out: comes back once it is gone
-    // A brick that cannot be read is remembered and left out from here on.
-    if (load(candidate.brick)) ++read;
-  }
-  return read > 0;
-}
-
-void BrickStore::State::stream() {
-  Vec3 position = Vec3::Zero();
-  Vec3 velocity = Vec3::Zero();
-  Motion motion;
-  std::optional<Way> done;
-  Clock::time_point done_at;
-  while (!stop.load(std::memory_order_relaxed)) {
-    if (target.read(position, velocity) != 0) {
-      motion.update(position, velocity);
-      const Way way(header(), motion);
-      const bool settled = done && way.like(*done) && Clock::now() - done_at < settled_time;
-      if (!settled) {
-        if (stream_once(way)) continue;
-        done = way;
-        done_at = Clock::now();
-      }
-    }
-    std::this_thread::sleep_for(poll_time);
-  }
-}
-
-/// Takes doomed bricks on until `done`. Readers leave within a tick: who stays for seconds never will.
-template <class Done>
-bool BrickStore::State::patiently(const Done& done) {
-  constexpr auto patience = std::chrono::seconds(2);
-  const Clock::time_point begin = Clock::now();
-  while (!done() && Clock::now() - begin < patience) {
-    pool->reclaim();
-    if (!done()) std::this_thread::sleep_for(std::chrono::microseconds(20));
-  }
-  return done();
-}
-
-/// Takes away what is farthest from the way and outside of `keep`, and waits until its slot is free.
-bool BrickStore::State::wait_for_slot(const Way& way, const BrickLevel& level, const BrickBox& keep) {
-  pool->reclaim();
-  if (pool->free_slots() > 0) return true;
-  if (pool->retiring() == 0) {
-    pool->list_evictable(evictable_);
-    Candidate farthest{-1.0, no_index};
-    for (const std::uint32_t brick : evictable_) {
-      const bool kept = !all_bricks(level, keep, [&](std::uint32_t other, const auto&) { return other != brick; });
-      const double distance = kept ? -1.0 : way.distance(brick);
-      if (distance > farthest.distance) farthest = {distance, brick};
-    }
-    if (farthest.brick == no_index) return false;
-    pool->doom(farthest.brick);
-  }
-  return patiently([&] { return pool->free_slots() > 0; });
-}
-
-Status BrickStore::State::fetch(const BrickLevel& level, const BrickBox& box, const Way& way) {
-  const auto full = [&] {
-    return Error{ErrorCode::too_large, "needs more bricks than the resident memory takes", pool->file(), "resident",
-                 "more memory, or a coarser level"};
-  };
-  std::uint64_t wanted = 1;
-  for (std::size_t a = 0; a < 3; ++a) wanted *= box.last[a] - box.first[a] + 1;
-  if (level.first < pool->first_pinned() && wanted > pool->slots()) return full();
-  Status outcome = success();
-  all_bricks(level, box, [&](std::uint32_t brick, const auto&) {
-    // A doomed one must be gone before it can come back.
-    const bool gone = pool->ready(brick) || patiently([&] { return !pool->here(brick); });
-    if (pool->ready(brick)) return true;
-    outcome = gone && wait_for_slot(way, level, box) ? load(brick) : Status(full());
-    return outcome.ok();
-  });
-  return outcome;
-}
 
 BrickStore::BrickStore() : state_(std::make_unique<State>()) {}
 
@@ -413,6 +398,7 @@ Result<std::unique_ptr<BrickStore>> BrickStore::open(const std::filesystem::path
   State& state = *store->state_;
   ASPERITY_TRY(state.pool, BrickPool::open(file, settings.resident_bytes));
   const BrickFileHeader& header = state.header();
+  store->header_ = &header;
   state.damaged.resize(header.bricks.size());
   for (const BrickLevel& level : header.levels) {
     std::vector<ValueRange> ranges(level.count());
@@ -423,29 +409,8 @@ Result<std::unique_ptr<BrickStore>> BrickStore::open(const std::filesystem::path
   return store;
 }
 
-int BrickStore::levels() const noexcept {
-  return static_cast<int>(state_->header().levels.size());
-}
-const GridAxes& BrickStore::axes(int level) const noexcept {
-  return state_->header().levels[static_cast<std::size_t>(level)].axes;
-}
 const MinMaxOctree& BrickStore::octree(int level) const noexcept {
   return state_->octrees[static_cast<std::size_t>(level)];
-}
-SampleType BrickStore::type() const noexcept {
-  return state_->header().type;
-}
-double BrickStore::lowest() const noexcept {
-  return state_->header().lowest;
-}
-double BrickStore::highest() const noexcept {
-  return state_->header().highest;
-}
-const std::string& BrickStore::name() const noexcept {
-  return state_->header().name;
-}
-std::uint64_t BrickStore::file_bytes() const noexcept {
-  return state_->header().file_bytes;
 }
 
 std::size_t BrickStore::resident_bytes() const noexcept {
@@ -496,11 +461,7 @@ bool BrickStore::samples(int level_number, const CellIndex& cell, double out[64]
   }
   const std::byte* brick = state_->pool->find(number_of(level, at[0], at[1], at[2]));
   if (brick == nullptr) return false;
-  switch (type()) {
-    case SampleType::int16: gather<std::int16_t>(brick, local, out); break;
-    case SampleType::uint8: gather<std::uint8_t>(brick, local, out); break;
-    case SampleType::float32: gather<float>(brick, local, out); break;
-  }
+  with_samples_of(type(), [&]<class Sample>() { gather<Sample>(brick, local, out); });
   return true;
 }
 

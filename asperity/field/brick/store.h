@@ -7,6 +7,7 @@
 #include <string>
 
 #include "asperity/core/progress.h"
+#include "asperity/field/brick/file.h"
 #include "asperity/field/volume/cell_polynomial.h"
 #include "asperity/field/volume/min_max_octree.h"
 #include "asperity/field/volume/scalar_grid.h"
@@ -39,15 +40,17 @@ class BrickStore {
   BrickStore(const BrickStore&) = delete;
   BrickStore& operator=(const BrickStore&) = delete;
 
-  [[nodiscard]] int levels() const noexcept;
-  [[nodiscard]] const GridAxes& axes(int level) const noexcept;
+  [[nodiscard]] int levels() const noexcept { return static_cast<int>(header_->levels.size()); }
+  [[nodiscard]] const GridAxes& axes(int level) const noexcept {
+    return header_->levels[static_cast<std::size_t>(level)].axes;
+  }
   /// Its leaves are the bricks; ranges hold one ring of samples around each. [servo]
   [[nodiscard]] const MinMaxOctree& octree(int level) const noexcept;
-  [[nodiscard]] SampleType type() const noexcept;
-  [[nodiscard]] double lowest() const noexcept;
-  [[nodiscard]] double highest() const noexcept;
-  [[nodiscard]] const std::string& name() const noexcept;
-  [[nodiscard]] std::uint64_t file_bytes() const noexcept;
+  [[nodiscard]] SampleType type() const noexcept { return header_->type; }
+  [[nodiscard]] double lowest() const noexcept { return header_->lowest; }
+  [[nodiscard]] double highest() const noexcept { return header_->highest; }
+  [[nodiscard]] const std::string& name() const noexcept { return header_->name; }
+  [[nodiscard]] std::uint64_t file_bytes() const noexcept { return header_->file_bytes; }
   /// Memory taken, all of it at opening. [any]
   [[nodiscard]] std::size_t resident_bytes() const noexcept;
   [[nodiscard]] BrickTraffic traffic() const noexcept;  ///< [any]
@@ -77,6 +80,7 @@ class BrickStore {
   BrickStore();
   struct State;
   std::unique_ptr<State> state_;
+  const BrickFileHeader* header_ = nullptr;  ///< of state_
 };
 
 }  // namespace asperity

@@ -9,8 +9,6 @@
 #include <atomic>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <system_error>
 
 #include "asperity/field/brick/file.h"
@@ -224,37 +222,9 @@ class LevelWriter {
   std::uint32_t row_ = 0;
 };
 
-/// Range and holes of what comes in.
-struct Survey {
-  double lowest = infinity;
-  double highest = -infinity;
-  std::uint64_t unknown = 0;
-
-  template <class Sample>
-  Status take(const std::vector<Sample>& samples, const GridAxes& axes, std::uint32_t first_layer) {
-    for (std::size_t n = 0; n < samples.size(); ++n) {
-      const auto value = static_cast<double>(samples[n]);
-      if (std::isnan(value)) {
-        ++unknown;
-        continue;
-      }
-      if (std::isinf(value)) {
-        const std::size_t width = axes[0].size();
-        const std::size_t layer = width * axes[1].size();
-        return Error{ErrorCode::bad_value, "is infinite", "",
-                     fmt::format("sample ({}, {}, {})", n % width, n % layer / width, first_layer + n / layer),
-                     "finite values, or not-a-number where nothing is known"};
-      }
-      lowest = std::min(lowest, value);
-      highest = std::max(highest, value);
-    }
-    return success();
-  }
-};
-
 template <class Sample>
 Status write_samples(BrickFileHeader& header, AsideFile& file, const SlabSource& source, const Progress& progress,
-                     Survey& survey) {
+                     SampleSurvey& survey) {
   const GridAxes& axes = header.levels.front().axes;
   const std::uint32_t layers = axes[2].size();
   const std::size_t layer = static_cast<std::size_t>(axes[0].size()) * axes[1].size();
@@ -270,10 +240,10 @@ Status write_samples(BrickFileHeader& header, AsideFile& file, const SlabSource&
     ASPERITY_CHECK(source(first, last, slab));
     const auto* filled = std::get_if<std::vector<Sample>>(&slab);
     if (filled == nullptr || filled->size() != layer * (last - first)) {
-      return Error{ErrorCode::mismatch, "a slab of another type or size came in", "",
-                   fmt::format("layers {} to {}", first, last), "one sample for each node"};
+      return refused(ErrorCode::mismatch, "a slab of another type or size came in",
+                     fmt::format("layers {} to {}", first, last), "one sample for each node");
     }
-    ASPERITY_CHECK(survey.take(*filled, axes, first));
+    ASPERITY_CHECK(survey.take(slab, axes, first));
     for (std::uint32_t k = 0; k < last - first; ++k) ASPERITY_CHECK(finest.push(filled->data() + layer * k));
   }
   return success();
@@ -289,10 +259,8 @@ std::size_t brick_writer_memory(const GridAxes& axes, SampleType type) noexcept 
 
 Result<BrickFileSummary> write_brick_file(const std::filesystem::path& path, const GridAxes& axes, SampleType type,
                                           const std::string& name, const SlabSource& source, const Progress& progress) {
-  for (const GridAxis& axis : axes) {
-    if (axis.size() < 2)
-      return Error{ErrorCode::bad_value, "has an axis without cells", path.string(), name, "two nodes"};
-  }
+  if (std::any_of(axes.begin(), axes.end(), [](const GridAxis& axis) { return axis.size() < 2; }))
+    return Error{ErrorCode::bad_value, "has an axis without cells", path.string(), name, "two nodes"};
   BrickFileHeader header;
   header.type = type;
   header.name = name;
@@ -307,18 +275,11 @@ Result<BrickFileSummary> write_brick_file(const std::filesystem::path& path, con
 
   AsideFile file(path);
   ASPERITY_CHECK(file.create(header.file_bytes));
-  Survey survey;
-  const auto write = [&] {
-    switch (type) {
-      case SampleType::int16: return write_samples<std::int16_t>(header, file, source, progress, survey);
-      case SampleType::uint8: return write_samples<std::uint8_t>(header, file, source, progress, survey);
-      case SampleType::float32: break;
-    }
-    return write_samples<float>(header, file, source, progress, survey);
-  };
-  ASPERITY_CHECK(write());
+  SampleSurvey survey;
+  ASPERITY_CHECK(with_samples_of(
+      type, [&]<class Sample>() { return write_samples<Sample>(header, file, source, progress, survey); }));
   if (survey.lowest > survey.highest) {
-    return Error{ErrorCode::bad_value, "holds no sample that is a number", "", name, "samples that are numbers"};
+    return bad_value("holds no sample that is a number", name, "samples that are numbers");
   }
   header.lowest = survey.lowest;
   header.highest = survey.highest;

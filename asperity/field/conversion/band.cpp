@@ -21,9 +21,9 @@ class ExactBand {
   ExactBand(const TriangleIndex& index, const BandFrame& frame, std::vector<VoxelBlock>& blocks)
       : index_(index), frame_(frame), blocks_(blocks), map_(blocks), outside_(blocks.size()) {
     // As the voxeliser had it: distances change under the threads' hands.
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      for (std::size_t n = 0; n < SparseBlock::points; ++n) outside_[b][n] = blocks[b].distance[n] > 0.0F;
-    }
+    for_each_node(blocks, [&](const Node& node) {
+      outside_[node.block][node.point] = blocks[node.block].distance[node.point] > 0.0F;
+    });
   }
 
   /// Makes the points that have a face exact; answers the largest correction (m).
@@ -39,9 +39,7 @@ class ExactBand {
   void complete() {
     std::vector<Candidate> candidates;
     tried_.assign(blocks_.size(), {});
-    for (std::uint32_t b = 0, count = static_cast<std::uint32_t>(blocks_.size()); b < count; ++b) {
-      for (std::uint32_t n = 0; n < SparseBlock::points; ++n) propose_around({b, n}, candidates);
-    }
+    for_each_node(blocks_, [&](const Node& node) { propose_around(node, candidates); });
     while (!candidates.empty()) {
       parallel_for(candidates.size(), shared_out, [&](std::size_t i) { try_candidate(candidates[i]); });
       std::vector<Candidate> next;
@@ -113,22 +111,15 @@ class ExactBand {
     if (!(std::abs(distance) < (inside ? frame_.inward : frame_.outward))) return;
     for (std::uint32_t way = 0; way < 6; ++way) {
       Node next = map_.beside(node, way);
-      if (next.block == no_index) next.block = make_block(place_beside(blocks_[node.block].at, way), inside);
+      if (next.block == no_index) {
+        const double beyond = inside ? -frame_.inward : frame_.outward;
+        next.block = map_.append(place_beside(blocks_[node.block].at, way), beyond, blocks_);
+        tried_.emplace_back();
+      }
       if (blocks_[next.block].face[next.point] != no_index || tried_[next.block][next.point]) continue;
       tried_[next.block][next.point] = true;
       candidates.push_back({next, inside});
     }
-  }
-
-  std::uint32_t make_block(const std::array<std::int32_t, 3>& at, bool inside) {
-    VoxelBlock block;
-    block.at = at;
-    block.distance.fill(static_cast<float>(inside ? -frame_.inward : frame_.outward));
-    block.face.fill(no_index);
-    blocks_.push_back(block);
-    tried_.emplace_back();
-    map_.add(at);
-    return static_cast<std::uint32_t>(blocks_.size() - 1);
   }
 
   void try_candidate(Candidate& candidate) const {
@@ -164,8 +155,13 @@ std::uint32_t BlockMap::find(const std::array<std::int32_t, 3>& at) const {
   return found == index_.end() ? no_index : found->second;
 }
 
-void BlockMap::add(const std::array<std::int32_t, 3>& at) {
-  const auto block = static_cast<std::uint32_t>(beside_.size());
+std::uint32_t BlockMap::append(const std::array<std::int32_t, 3>& at, double distance,
+                               std::vector<VoxelBlock>& blocks) {
+  const auto block = static_cast<std::uint32_t>(blocks.size());
+  VoxelBlock& added = blocks.emplace_back();
+  added.at = at;
+  added.distance.fill(static_cast<float>(distance));
+  added.face.fill(no_index);
   index_.emplace(key_of(at), block);
   beside_.emplace_back();
   for (std::uint32_t way = 0; way < 6; ++way) {
@@ -173,6 +169,7 @@ void BlockMap::add(const std::array<std::int32_t, 3>& at) {
     beside_[block][way] = other;
     if (other != no_index) beside_[other][way ^ 1U] = block;
   }
+  return block;
 }
 
 std::array<std::int32_t, 3> place_beside(std::array<std::int32_t, 3> at, std::uint32_t way) noexcept {

@@ -2,6 +2,7 @@
 #include <bitset>
 #include <cmath>
 #include <queue>
+#include <unordered_set>
 
 #include "asperity/field/conversion/detail/signs.h"
 
@@ -21,9 +22,7 @@ class Bridge {
         signed_(blocks.size(), std::bitset<SparseBlock::points>().set()) {}
 
   void run() {
-    for (std::uint32_t b = 0, count = static_cast<std::uint32_t>(blocks_.size()); b < count; ++b) {
-      for (std::uint32_t n = 0; n < SparseBlock::points; ++n) look_around({b, n}, 1);
-    }
+    for_each_node(blocks_, [&](const Node& node) { look_around(node, 1); });
     // Holes can be wider than the band: its border is followed into what is not stored yet.
     for (std::size_t i = 0; i < edge_.size(); ++i) {
       const Node node = edge_[i];
@@ -75,13 +74,8 @@ class Bridge {
   Node made_beside(const Node& node, std::uint32_t way) {
     Node next = map_.beside(node, way);
     if (next.block != no_index) return next;
-    VoxelBlock block;
-    block.at = place_beside(blocks_[node.block].at, way);
-    block.distance.fill(static_cast<float>(std::max(frame_.outward, frame_.inward)));
-    block.face.fill(no_index);
-    map_.add(block.at);
-    next.block = static_cast<std::uint32_t>(blocks_.size());
-    blocks_.push_back(block);
+    const double beyond = std::max(frame_.outward, frame_.inward);
+    next.block = map_.append(place_beside(blocks_[node.block].at, way), beyond, blocks_);
     signed_.emplace_back();
     return next;
   }
@@ -172,10 +166,9 @@ class Bridge {
     return distance;
   }
 
+  using Reached = std::pair<double, Node>;
   struct Later {
-    bool operator()(const std::pair<double, Node>& a, const std::pair<double, Node>& b) const {
-      return a.first > b.first;
-    }
+    bool operator()(const Reached& a, const Reached& b) const { return a.first > b.first; }
   };
 
   const TriangleIndex& index_;
@@ -187,7 +180,7 @@ class Bridge {
   std::vector<Node> edge_;  ///< points beside a crossing
   std::unordered_set<std::uint64_t> listed_;
   std::unordered_set<std::uint64_t> moved_;
-  std::priority_queue<std::pair<double, Node>, std::vector<std::pair<double, Node>>, Later> front_;
+  std::priority_queue<Reached, std::vector<Reached>, Later> front_;
 };
 
 }  // namespace

@@ -35,9 +35,11 @@ double longest_side(const TriangleMesh& mesh) {
 }
 
 Status check_settings(const TriangleMesh& mesh, const ConversionSettings& settings) {
-  const auto no_length = [](double value) { return !(value >= 0.0) || std::isinf(value); };
-  if (no_length(settings.voxel))
-    return bad_value(fmt::format("is {}", settings.voxel), "voxel", "a length above 0 (m)");
+  const auto check_length = [](double value, const char* place, const char* accepted) -> Status {
+    if (value >= 0.0 && !std::isinf(value)) return success();
+    return bad_value(fmt::format("is {}", value), place, accepted);
+  };
+  ASPERITY_CHECK(check_length(settings.voxel, "voxel", "a length above 0 (m)"));
   const int given =
       (settings.voxel > 0.0 ? 1 : 0) + (settings.resolution > 0 ? 1 : 0) + (settings.budget_bytes > 0 ? 1 : 0);
   if (given > 1) return bad_value("is given besides another size", "voxel", "one of voxel, resolution and budget");
@@ -52,13 +54,10 @@ Status check_settings(const TriangleMesh& mesh, const ConversionSettings& settin
                      fmt::format("{} to {} m: 8 to 4096 voxels along the longest side", longest / most_resolution,
                                  longest / least_resolution));
   }
-  if (no_length(settings.band_outside))
-    return bad_value(fmt::format("is {}", settings.band_outside), "band_outside", "a finite length, 0 or more (m)");
+  ASPERITY_CHECK(check_length(settings.band_outside, "band_outside", "a finite length, 0 or more (m)"));
   if (!(settings.band_inside >= 0.0))
     return bad_value(fmt::format("is {}", settings.band_inside), "band_inside", "a length, 0 or more (m), or infinity");
-  if (no_length(settings.shell_thickness))
-    return bad_value(fmt::format("is {}", settings.shell_thickness), "shell_thickness",
-                     "a finite length, 0 or more (m)");
+  ASPERITY_CHECK(check_length(settings.shell_thickness, "shell_thickness", "a finite length, 0 or more (m)"));
   if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
     return bad_value(fmt::format("is given for rule {}", to_string(settings.rule)), "shell_thickness",
                      "rule shell or automatic");
@@ -96,13 +95,10 @@ Result<Judgement> judge(const TriangleMesh& mesh, InsideRule wanted) {
   const std::string state =
       fmt::format("the mesh has {}; beside {:.1f} % of its faces the winding number tells outside from inside", flaws,
                   100.0 * share);
-  if (share >= slightly_broken) {
-    out.rule = InsideRule::winding;
-    out.notes.push_back(state + ": inside is where it exceeds 1/2, which bridges the holes");
-  } else {
-    out.rule = InsideRule::shell;
-    out.notes.push_back(state + ": it has no inside, and gets a shell around its faces");
-  }
+  const bool broken_slightly = share >= slightly_broken;
+  out.rule = broken_slightly ? InsideRule::winding : InsideRule::shell;
+  out.notes.push_back(state + (broken_slightly ? ": inside is where it exceeds 1/2, which bridges the holes"
+                                               : ": it has no inside, and gets a shell around its faces"));
   return out;
 }
 
@@ -139,10 +135,8 @@ class Converter {
  private:
   /// Bands and origin at this voxel.
   [[nodiscard]] Attempt planned(double voxel) const {
-    Attempt plan;
-    plan.voxel = voxel;
     // Half a voxel off: the sides of a box that is whole voxels long lie between nodes, where their sign is plain.
-    plan.origin = mesh_.bounds().lower - Vec3::Constant(0.5 * voxel);
+    Attempt plan{voxel, mesh_.bounds().lower - Vec3::Constant(0.5 * voxel), 0.0, 0.0, 0.0, {}};
     plan.outside = std::max(settings_.band_outside, least_band * voxel);
     plan.inside = std::max(settings_.band_inside > 0.0 ? settings_.band_inside : 0.0, least_band * voxel);
     if (judgement_.rule == InsideRule::shell)
@@ -299,18 +293,15 @@ class Converter {
                                  attempt.voxel),
                      {}, "a closed mesh thicker than the voxel, or rule shell");
     }
-    SparseSource source;
-    source.voxel = attempt.voxel;
-    source.origin = attempt.origin;
     const auto outside = static_cast<float>(attempt.outside);
     auto inside = static_cast<float>(-attempt.inside);
     // Stored throughout: the deepest value is the least.
     if (std::isinf(inside)) inside = static_cast<float>(std::min(deepest_stored, -least_band * attempt.voxel));
     if (judgement_.rule == InsideRule::shell) inside = static_cast<float>(-0.5 * attempt.thickness);
-    source.outside = static_cast<double>(outside);
-    source.inside = static_cast<double>(inside);
+    SparseSource source{attempt.voxel, attempt.origin, static_cast<double>(outside), static_cast<double>(inside), {}};
     source.blocks.reserve(attempt.blocks.size());
-    ConversionReport report;
+    ConversionReport report{judgement_.rule,     attempt.voxel,   attempt.thickness, 0,
+                            largest_correction_, judgement_.notes};
     for (const VoxelBlock& block : attempt.blocks) {
       SparseBlock stored;
       stored.at = block.at;
@@ -325,21 +316,17 @@ class Converter {
       source.blocks.push_back(std::move(stored));
     }
     attempt.blocks = {};
-    report.rule = judgement_.rule;
-    report.voxel = attempt.voxel;
-    report.shell_thickness = attempt.thickness;
-    report.largest_correction = largest_correction_;
-    report.notes = judgement_.notes;
-    if (judgement_.rule == InsideRule::shell)
-      report.notes.push_back(fmt::format(
-          "the shell is {:.3g} voxels thick: the potential is the distance from the faces less half of that",
-          attempt.thickness / attempt.voxel));
-    if (settings_.band_outside > 0.0 && settings_.band_outside < least_band * attempt.voxel)
-      report.notes.push_back(
-          fmt::format("distances are stored {:.3g} voxels out: three are the least", attempt.outside / attempt.voxel));
-    if (settings_.band_inside > 0.0 && settings_.band_inside < least_band * attempt.voxel)
-      report.notes.push_back(
-          fmt::format("distances are stored {:.3g} voxels in: three are the least", attempt.inside / attempt.voxel));
+    const auto note = [&](bool holds, std::string text) {
+      if (holds) report.notes.push_back(std::move(text));
+    };
+    const double least = least_band * attempt.voxel;
+    note(judgement_.rule == InsideRule::shell,
+         fmt::format("the shell is {:.3g} voxels thick: the potential is the distance from the faces less half of that",
+                     attempt.thickness / attempt.voxel));
+    note(settings_.band_outside > 0.0 && settings_.band_outside < least,
+         fmt::format("distances are stored {:.3g} voxels out: three are the least", attempt.outside / attempt.voxel));
+    note(settings_.band_inside > 0.0 && settings_.band_inside < least,
+         fmt::format("distances are stored {:.3g} voxels in: three are the least", attempt.inside / attempt.voxel));
     ASPERITY_TRY(SparseGrid grid, SparseGrid::build(std::move(source)));
     return ConvertedMesh{std::move(grid), std::move(report)};
   }

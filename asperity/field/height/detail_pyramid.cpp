@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace asperity {
@@ -16,8 +17,8 @@ constexpr std::size_t most_dilated_texels = std::size_t{1} << 25U;
 Status check_dilatable(const HeightMap& heights) {
   const std::size_t texels = static_cast<std::size_t>(heights.width()) * static_cast<std::size_t>(heights.height());
   if (texels <= most_dilated_texels) return success();
-  return Error{ErrorCode::too_large, fmt::format("{} texels to dilate", texels), "", "",
-               fmt::format("a map of at most {} texels", most_dilated_texels)};
+  return refused(ErrorCode::too_large, fmt::format("{} texels to dilate", texels), {},
+                 fmt::format("a map of at most {} texels", most_dilated_texels));
 }
 
 Vec2 texel_size(const HeightMap& heights, const Vec2& tile) {
@@ -25,12 +26,7 @@ Vec2 texel_size(const HeightMap& heights, const Vec2& tile) {
 }
 
 std::vector<double> texels_of(const HeightMap& heights) {
-  std::vector<double> values;
-  values.reserve(static_cast<std::size_t>(heights.width()) * static_cast<std::size_t>(heights.height()));
-  for (int y = 0; y < heights.height(); ++y) {
-    for (int x = 0; x < heights.width(); ++x) values.push_back(heights.texel(x, y));
-  }
-  return values;
+  return tabulated<double>(heights.width(), heights.height(), [&](const Vec2& st) { return heights.height_at(st); });
 }
 
 // ---- dilation ---------------------------------------------------------------------------
@@ -262,10 +258,7 @@ class LineFilter {
         sums_(ring_ + 1) {}
 
   void run(double* values, std::size_t stride) {
-    for (std::size_t i = 0; i < count_; ++i) line_[i] = line_[ring_ - 1 - i] = values[i * stride];
-    if (ring_ == count_) {
-      for (std::size_t i = 0; i < count_; ++i) line_[i] = values[i * stride];
-    }
+    for (std::size_t i = 0; i < ring_; ++i) line_[i] = values[(i < count_ ? i : ring_ - 1 - i) * stride];
     for (int pass = 0; pass < 3; ++pass) average();
     for (std::size_t i = 0; i < count_; ++i) values[i * stride] = line_[i];
   }
@@ -316,13 +309,6 @@ class LineFilter {
   std::vector<double> sums_;
 };
 
-std::vector<float> to_floats(const std::vector<double>& values) {
-  std::vector<float> floats;
-  floats.reserve(values.size());
-  for (const double value : values) floats.push_back(static_cast<float>(value));
-  return floats;
-}
-
 /// Texels along an axis of `side` (m) that hold wavelengths down to `scale`, with four for each.
 int texels_for(int texels, double side, double scale, Reconstruction reconstruction) {
   if (reconstruction != Reconstruction::quadratic_bspline) return texels;
@@ -340,17 +326,13 @@ Result<HeightMap> low_passed(const HeightMap& heights, const Vec2& tile, double 
   for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) along_rows.run(&values[y * columns], 1);
   LineFilter along_columns(height, heights.wrap(), scale / texel.y());
   for (std::size_t x = 0; x < columns; ++x) along_columns.run(&values[x], columns);
-  Result<HeightMap> full = HeightMap::build(to_floats(values), width, height, heights.wrap(), heights.reconstruction());
+  Result<HeightMap> full = HeightMap::build(std::vector<float>(values.begin(), values.end()), width, height,
+                                            heights.wrap(), heights.reconstruction());
   const int fewer_columns = texels_for(width, tile.x(), scale, heights.reconstruction());
   const int fewer_rows = texels_for(height, tile.y(), scale, heights.reconstruction());
   if (!full || (fewer_columns == width && fewer_rows == height)) return full;
-  std::vector<float> fewer;
-  for (int y = 0; y < fewer_rows; ++y) {
-    for (int x = 0; x < fewer_columns; ++x)
-      fewer.push_back(
-          static_cast<float>(full->height_at({(x + 0.5) / fewer_columns, (fewer_rows - y - 0.5) / fewer_rows})));
-  }
-  return HeightMap::build(std::move(fewer), fewer_columns, fewer_rows, heights.wrap(), heights.reconstruction());
+  return HeightMap::build(tabulated(fewer_columns, fewer_rows, [&](const Vec2& st) { return full->height_at(st); }),
+                          fewer_columns, fewer_rows, heights.wrap(), heights.reconstruction());
 }
 
 // ---- settings ---------------------------------------------------------------------------
@@ -395,10 +377,10 @@ Status check_size(const DetailSettings& settings, const HeightMap& heights, cons
   // A float a texel, and two thirds of that for its bounds.
   const double bytes = texels_in_all(settings, heights, tile) * sizeof(float) * 5.0 / 3.0;
   if (bytes <= static_cast<double>(settings.most_bytes)) return success();
-  return Error{ErrorCode::too_large, fmt::format("{} levels of detail take {:.0f} MB", settings.levels, bytes * 1e-6),
-               "", "levels",
-               fmt::format("at most {:.0f} MB: fewer levels, or a smaller map",
-                           static_cast<double>(settings.most_bytes) * 1e-6)};
+  return refused(ErrorCode::too_large, fmt::format("{} levels of detail take {:.0f} MB", settings.levels, bytes * 1e-6),
+                 "levels",
+                 fmt::format("at most {:.0f} MB: fewer levels, or a smaller map",
+                             static_cast<double>(settings.most_bytes) * 1e-6));
 }
 
 }  // namespace
@@ -417,29 +399,29 @@ Result<DetailPyramid> DetailPyramid::build(const HeightMap& heights, const Vec2&
   DetailPyramid pyramid;
   pyramid.kind_ = settings.kind;
   pyramid.finest_ = settings.finest;
-  const auto scale_of = [&](int level) { return std::ldexp(settings.finest, level - 1); };
-  if (settings.kind == DetailKind::dilation) {
-    const BlockMaxima maxima(texels_of(heights), heights.width(), heights.height());
-    for (int level = 1; level <= settings.levels; ++level) {
-      ASPERITY_TRY(HeightMap map, rolled(maxima, heights, tile, scale_of(level)));
-      ASPERITY_CHECK(pyramid.add(heights, std::move(map), scale_of(level)));
-    }
-    return pyramid;
+  std::optional<BlockMaxima> maxima;
+  if (settings.kind == DetailKind::dilation) maxima.emplace(texels_of(heights), heights.width(), heights.height());
+  // The last level of a low-pass pyramid is flat.
+  for (int level = 1; level < settings.levels + (maxima ? 1 : 0); ++level) {
+    const double scale = std::ldexp(settings.finest, level - 1);
+    ASPERITY_TRY(HeightMap map, maxima ? rolled(*maxima, heights, tile, scale) : low_passed(heights, tile, scale));
+    ASPERITY_CHECK(pyramid.add(heights, std::move(map), scale));
   }
-  for (int level = 1; level < settings.levels; ++level) {
-    ASPERITY_TRY(HeightMap map, low_passed(heights, tile, scale_of(level)));
-    ASPERITY_CHECK(pyramid.add(heights, std::move(map), scale_of(level)));
-  }
-  ASPERITY_CHECK(pyramid.add_flat(heights));
+  if (maxima) return pyramid;
+  const std::vector<double> texels = texels_of(heights);
+  const double first = texels.front();
+  const double sum = std::accumulate(texels.begin(), texels.end(), 0.0,
+                                     [&](double so_far, double value) { return so_far + (value - first); });
+  const double mean = first + sum / static_cast<double>(texels.size());
+  ASPERITY_TRY(HeightMap flat,
+               HeightMap::build({static_cast<float>(mean)}, 1, 1, heights.wrap(), heights.reconstruction()));
+  ASPERITY_CHECK(pyramid.add(heights, std::move(flat), infinity));
   return pyramid;
 }
 
 Status DetailPyramid::add(const HeightMap& heights, HeightMap level, double scale) {
-  std::vector<float> difference;
-  for (int y = 0; y < heights.height(); ++y) {
-    for (int x = 0; x < heights.width(); ++x)
-      difference.push_back(static_cast<float>(level.height_at(heights.texel_centre(x, y)) - heights.texel(x, y)));
-  }
+  std::vector<float> difference = tabulated(
+      heights.width(), heights.height(), [&](const Vec2& st) { return level.height_at(st) - heights.height_at(st); });
   ASPERITY_TRY(const HeightMap between, HeightMap::build(std::move(difference), heights.width(), heights.height(),
                                                          heights.wrap(), heights.reconstruction()));
   const double before = removed_.empty() ? 0.0 : removed_.back();
@@ -453,17 +435,6 @@ Status DetailPyramid::add(const HeightMap& heights, HeightMap level, double scal
   scales_.push_back(scale);
   maps_.push_back(std::make_shared<const HeightMap>(std::move(level)));
   return success();
-}
-
-Status DetailPyramid::add_flat(const HeightMap& heights) {
-  const std::vector<double> texels = texels_of(heights);
-  const double first = texels.front();
-  const double sum = std::accumulate(texels.begin(), texels.end(), 0.0,
-                                     [&](double so_far, double value) { return so_far + (value - first); });
-  const double mean = first + sum / static_cast<double>(texels.size());
-  ASPERITY_TRY(HeightMap flat,
-               HeightMap::build({static_cast<float>(mean)}, 1, 1, heights.wrap(), heights.reconstruction()));
-  return add(heights, std::move(flat), infinity);
 }
 
 double DetailPyramid::level_of_scale(double scale) const noexcept {

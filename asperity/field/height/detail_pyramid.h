@@ -79,7 +79,6 @@ class DetailPyramid {
   DetailPyramid() = default;
   /// Builds a level's map from what measures it against `heights`.
   Status add(const HeightMap& heights, HeightMap level, double scale);
-  Status add_flat(const HeightMap& heights);
 
   DetailKind kind_ = DetailKind::dilation;
   double finest_ = 0.0;  ///< m, scale of level 1

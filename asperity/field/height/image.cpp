@@ -63,6 +63,8 @@ float luminance(const std::uint16_t* pixel) {
   return static_cast<float>(0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2]);
 }
 
+}  // namespace
+
 int channel_index(const Image& image, Channel channel) {
   switch (channel) {
     case Channel::green: return 1;
@@ -72,18 +74,16 @@ int channel_index(const Image& image, Channel channel) {
   }
 }
 
-}  // namespace
-
 Status validate(const Image& image) {
   const auto bad = [](std::string what, std::string accepted) {
-    return Status(Error{ErrorCode::bad_value, std::move(what), "", "", std::move(accepted)});
+    return Status(bad_value(std::move(what), {}, std::move(accepted)));
   };
   if (image.width <= 0 || image.height <= 0) {
     return bad(fmt::format("the image has no pixels ({} x {})", image.width, image.height), "at least 1 x 1 pixel");
   }
   if (image.pixels() > max_pixels) {
-    return Error{ErrorCode::too_large, fmt::format("the image has {} x {} pixels", image.width, image.height), "", "",
-                 fmt::format("at most {} pixels", max_pixels)};
+    return refused(ErrorCode::too_large, fmt::format("the image has {} x {} pixels", image.width, image.height), {},
+                   fmt::format("at most {} pixels", max_pixels));
   }
   if (image.channels < 1 || image.channels > 4) {
     return bad(fmt::format("the image has {} channels", image.channels), "1 to 4 channels");
@@ -105,8 +105,7 @@ Result<ChannelChoice> choose_channel(const Image& image, Channel requested) {
     std::string accepted = "automatic, luminance";
     if (image.has_colour()) accepted += ", red, green, blue";
     if (image.has_alpha()) accepted += ", alpha";
-    return Error{ErrorCode::bad_value, fmt::format("the image has no {} channel", to_string(requested)), "", "",
-                 std::move(accepted)};
+    return bad_value(fmt::format("the image has no {} channel", to_string(requested)), {}, std::move(accepted));
   }
   return ChannelChoice{requested, "as asked"};
 }

@@ -70,6 +70,8 @@ Result<ChannelChoice> choose_channel(const Image& image, Channel requested);
 /// [build]
 Status validate(const Image& image);
 
+/// Which of a pixel's numbers a channel (not `automatic`) is; of the luminance of colours the first of three. [any]
+int channel_index(const Image& image, Channel channel);
 /// One channel (not `automatic`) of a valid image that has it, as fractions of full white, row 0 on top. [build]
 std::vector<float> extract_channel(const Image& image, Channel channel);
 

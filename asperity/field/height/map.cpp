@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <string>
 #include <utility>
 
 #include "asperity/field/height/detail/spline_prefilter.h"
@@ -20,10 +19,7 @@ namespace {
 int level_step(const Image& image, Channel channel) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const bool mixed = channel == Channel::luminance && image.has_colour();
-  std::size_t index = 0;
-  if (channel == Channel::green) index = 1;
-  if (channel == Channel::blue) index = 2;
-  if (channel == Channel::alpha) index = channels - 1;
+  const auto index = static_cast<std::size_t>(channel_index(image, channel));
   const int first = image.samples[index];
   int step = 0;
   for (std::size_t i = 0; i < image.samples.size() && step != 1; i += channels) {
@@ -53,8 +49,8 @@ Status check(const std::vector<float>& heights, int width, int height) {
   }
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (texels > max_pixels) {
-    return Error{ErrorCode::too_large, fmt::format("the height map has {} x {} texels", width, height), "", "",
-                 fmt::format("at most {} texels", max_pixels)};
+    return refused(ErrorCode::too_large, fmt::format("the height map has {} x {} texels", width, height), {},
+                   fmt::format("at most {} texels", max_pixels));
   }
   if (heights.size() != texels) {
     return bad_value(fmt::format("the height map has {} heights", heights.size()), "",
@@ -159,11 +155,7 @@ Status check_tile(const Vec2& tile) {
 Result<HeightMap> HeightMap::build(const Image& image, Channel channel, const HeightMapSettings& settings) {
   ASPERITY_CHECK(check(settings));
   ASPERITY_TRY(ChannelChoice choice, choose_channel(image, channel));
-  HeightMap map;
-  map.width_ = image.width;
-  map.height_ = image.height;
-  map.wrap_ = settings.wrap;
-  map.reconstruction_ = settings.reconstruction;
+  HeightMap map(image.width, image.height, settings.wrap, settings.reconstruction);
   map.quantisation_step_ = settings.amplitude * level_step(image, choice.channel) / image.maximum();
   const double scale = settings.white_is_deep ? -settings.amplitude : settings.amplitude;
   map.store(extract_channel(image, choice.channel), settings.offset, scale);
@@ -174,11 +166,7 @@ Result<HeightMap> HeightMap::build(const Image& image, Channel channel, const He
 Result<HeightMap> HeightMap::build(std::vector<float> heights_m, int width, int height, Wrap wrap,
                                    Reconstruction reconstruction) {
   ASPERITY_CHECK(check(heights_m, width, height));
-  HeightMap map;
-  map.width_ = width;
-  map.height_ = height;
-  map.wrap_ = wrap;
-  map.reconstruction_ = reconstruction;
+  HeightMap map(width, height, wrap, reconstruction);
   map.store(heights_m, 0.0, 1.0);
   return map;
 }
@@ -224,37 +212,33 @@ std::size_t HeightMap::memory_bytes() const noexcept {
 }
 
 HeightSample HeightMap::sample(const Vec2& st) const noexcept {
-  switch (reconstruction_) {
-    case Reconstruction::quadratic_bspline: return sample_bspline(st);
-    case Reconstruction::bilinear: return sample_bilinear(st);
-    case Reconstruction::nearest: break;
+  if (reconstruction_ == Reconstruction::quadratic_bspline) {
+    const SplinePiece piece(stored(), wrap_, st);
+    const Three heights = piece.heights();
+    return {base_ + piece.in_t.value(heights),
+            {piece.in_t.value(piece.slopes()) * width_, piece.in_t.slope(heights) * height_}};
   }
-  return sample_nearest(st);
-}
-
-double HeightMap::height_at(const Vec2& st) const noexcept {
-  return sample(st).height;
-}
-
-HeightSample HeightMap::sample_nearest(const Vec2& st) const noexcept {
+  if (reconstruction_ == Reconstruction::bilinear) {
+    const BilinearPiece piece(stored(), wrap_, st);
+    return {base_ + piece.height_below + piece.fraction * (piece.height_above - piece.height_below),
+            {(piece.slope_below + piece.fraction * (piece.slope_above - piece.slope_below)) * width_,
+             (piece.height_above - piece.height_below) * height_}};
+  }
   const TexelPlace s = texel_under(unit_coordinate(st.x(), wrap_), width_);
   const TexelPlace t = texel_under(unit_coordinate(st.y(), wrap_), height_);
   const std::size_t row = static_cast<std::size_t>(t.index + 1) * stride_;
   return {base_ + values_[row + static_cast<std::size_t>(s.index + 1)], Vec2::Zero()};
 }
 
-HeightSample HeightMap::sample_bilinear(const Vec2& st) const noexcept {
-  const BilinearPiece piece(stored(), wrap_, st);
-  return {base_ + piece.height_below + piece.fraction * (piece.height_above - piece.height_below),
-          {(piece.slope_below + piece.fraction * (piece.slope_above - piece.slope_below)) * width_,
-           (piece.height_above - piece.height_below) * height_}};
+double HeightMap::height_at(const Vec2& st) const noexcept {
+  return sample(st).height;
 }
 
-HeightSample HeightMap::sample_bspline(const Vec2& st) const noexcept {
-  const SplinePiece piece(stored(), wrap_, st);
-  const Three heights = piece.heights();
-  return {base_ + piece.in_t.value(heights),
-          {piece.in_t.value(piece.slopes()) * width_, piece.in_t.slope(heights) * height_}};
+Vec2 HeightMap::central_slope(const Vec2& st) const noexcept {
+  const Vec2 ds(1.0 / width_, 0.0);
+  const Vec2 dt(0.0, 1.0 / height_);
+  return {(height_at(st + ds) - height_at(st - ds)) * 0.5 * width_,
+          (height_at(st + dt) - height_at(st - dt)) * 0.5 * height_};
 }
 
 HeightCurvature HeightMap::curvature(const Vec2& st) const noexcept {

@@ -32,6 +32,18 @@ struct Names<Wrap> {
   static constexpr auto table = std::to_array<Named<Wrap>>({{Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}});
 };
 
+/// Heights from a formula of texture coordinates, at the texel centres of a map, row 0 on top. [build]
+template <class Number = float, class Formula>
+std::vector<Number> tabulated(int width, int height, const Formula& formula) {
+  std::vector<Number> heights;
+  heights.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x)
+      heights.push_back(static_cast<Number>(formula(Vec2((x + 0.5) / width, (height - y - 0.5) / height))));
+  }
+  return heights;
+}
+
 /// Errors: bad_value where this is no size of one repeat of a map (m). [any]
 Status check_tile(const Vec2& tile);
 
@@ -85,6 +97,10 @@ class HeightMap {
   /// Height alone (m). [servo]
   [[nodiscard]] double height_at(const Vec2& st) const noexcept;
 
+  /// Slopes by central differences over two texels, m per unit of texture coordinate, whatever the reconstruction.
+  /// [any]
+  [[nodiscard]] Vec2 central_slope(const Vec2& st) const noexcept;
+
   /// Height, gradient (both equal to `sample`'s to the bit) and second derivatives of the reconstruction, which jump on
   /// the lines where its pieces meet. In a piece of the spline, a texel, `ss` is constant along s, `tt` along t and
   /// `st` linear along both; bilinear has `st` alone, nearest none. Outside, along a clamped axis, its own are 0.
@@ -126,12 +142,10 @@ class HeightMap {
   }
 
  private:
-  HeightMap() = default;
-  /// Stores offset + scale * source as the reconstruction needs it. width_, height_, wrap_, reconstruction_ are set.
+  HeightMap(int width, int height, Wrap wrap, Reconstruction reconstruction)
+      : width_(width), height_(height), wrap_(wrap), reconstruction_(reconstruction) {}
+  /// Stores offset + scale * source as the reconstruction needs it.
   void store(const std::vector<float>& source, double offset, double scale);
-  [[nodiscard]] HeightSample sample_nearest(const Vec2& st) const noexcept;
-  [[nodiscard]] HeightSample sample_bilinear(const Vec2& st) const noexcept;
-  [[nodiscard]] HeightSample sample_bspline(const Vec2& st) const noexcept;
   [[nodiscard]] HeightCurvature curvature_bspline(const Vec2& st) const noexcept;
   [[nodiscard]] StoredTexels stored() const noexcept { return {values_.data(), width_, height_, reconstruction_}; }
 

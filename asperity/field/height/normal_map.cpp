@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "asperity/field/height/detail/texel_coordinate.h"
 
@@ -18,22 +17,10 @@ double decode(std::uint16_t code, int bits) {
   return bits == 16 ? std::max((code - 32768) / 32767.0, -1.0) : std::max((code - 128) / 127.0, -1.0);
 }
 
-/// Central difference of the heights over two texels, per unit of texture coordinate.
-Vec2 central_slope(const HeightMap& heights, const Vec2& st) {
-  const Vec2 ds(1.0 / heights.width(), 0.0);
-  const Vec2 dt(0.0, 1.0 / heights.height());
-  return {(heights.height_at(st + ds) - heights.height_at(st - ds)) * 0.5 * heights.width(),
-          (heights.height_at(st + dt) - heights.height_at(st - dt)) * 0.5 * heights.height()};
-}
-
 }  // namespace
 
-void NormalMap::allocate(int width, int height, Wrap wrap, NormalFilter filter) {
-  width_ = width;
-  height_ = height;
-  wrap_ = wrap;
-  filter_ = filter;
-  stride_ = static_cast<std::size_t>(width) + 2;
+NormalMap::NormalMap(int width, int height, Wrap wrap, NormalFilter filter)
+    : stride_(static_cast<std::size_t>(width) + 2), width_(width), height_(height), wrap_(wrap), filter_(filter) {
   values_.assign(stride_ * (static_cast<std::size_t>(height) + 2), Vec3f::UnitZ());
 }
 
@@ -44,11 +31,10 @@ std::size_t NormalMap::index(int x, int y) const noexcept {
 Result<NormalMap> NormalMap::build(const Image& image, const NormalMapSettings& settings) {
   ASPERITY_CHECK(validate(image));
   if (!image.has_colour()) {
-    return Error{ErrorCode::bad_value, fmt::format("the normal map has {} channel(s)", image.channels), "", "",
-                 "red, green and blue: x, y and z of the normal"};
+    return bad_value(fmt::format("the normal map has {} channel(s)", image.channels), {},
+                     "red, green and blue: x, y and z of the normal");
   }
-  NormalMap map;
-  map.allocate(image.width, image.height, settings.wrap, settings.filter);
+  NormalMap map(image.width, image.height, settings.wrap, settings.filter);
   const double up = settings.green == GreenConvention::up ? 1.0 : -1.0;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -68,11 +54,10 @@ Result<NormalMap> NormalMap::build(const Image& image, const NormalMapSettings& 
 
 Result<NormalMap> NormalMap::build(const HeightMap& heights, const Vec2& tile, NormalFilter filter) {
   ASPERITY_CHECK(check_tile(tile));
-  NormalMap map;
-  map.allocate(heights.width(), heights.height(), heights.wrap(), filter);
+  NormalMap map(heights.width(), heights.height(), heights.wrap(), filter);
   for (int y = 0; y < map.height_; ++y) {
     for (int x = 0; x < map.width_; ++x) {
-      const Vec2 slope = central_slope(heights, heights.texel_centre(x, y));
+      const Vec2 slope = heights.central_slope(heights.texel_centre(x, y));
       const Vec3 normal(-slope.x() / tile.x(), -slope.y() / tile.y(), 1.0);
       map.values_[map.index(x, y)] = normal.normalized().cast<float>();
     }

@@ -58,8 +58,7 @@ class NormalMap {
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return sizeof(*this) + values_.capacity() * sizeof(Vec3f); }
 
  private:
-  NormalMap() = default;
-  void allocate(int width, int height, Wrap wrap, NormalFilter filter);
+  NormalMap(int width, int height, Wrap wrap, NormalFilter filter);
   [[nodiscard]] std::size_t index(int x, int y) const noexcept;  // of a texel in values_; row 0 on top
 
   std::vector<Vec3f> values_;  // as in HeightMap: bottom row first, inside an apron of one texel

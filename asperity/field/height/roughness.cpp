@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace asperity {
 namespace {
@@ -34,6 +33,13 @@ struct Deviations {
   }
   [[nodiscard]] Roughness roughness() const { return {average / count, std::sqrt(square / count), slope / count}; }
 };
+
+/// Adds the share of one of `count` profiles to their mean.
+void add_share(Roughness& mean, const Roughness& own, int count) {
+  mean.average += own.average / count;
+  mean.rms += own.rms / count;
+  mean.mean_slope += own.mean_slope / count;
+}
 
 /// Mean of |a sin p + b sin q| over all p and q.
 double mean_of_two_waves(double a, double b) {
@@ -105,10 +111,7 @@ Roughness map_roughness(const SurfaceFeature& map, double direction) {
     Deviations deviations;
     for (const FeatureSample& sample : samples)
       deviations.add(sample.height - sum / points, sample.gradient.dot(along));
-    const Roughness own = deviations.roughness();
-    mean.average += own.average / lines_across;
-    mean.rms += own.rms / lines_across;
-    mean.mean_slope += own.mean_slope / lines_across;
+    add_share(mean, deviations.roughness(), lines_across);
   }
   return mean;
 }
@@ -124,10 +127,7 @@ Roughness mean_profile(const HeightMap& map, bool along_s, double spacing) {
     const auto across = static_cast<int>(std::int64_t{k} * available / count);
     for (int i = 0; i < length; ++i)
       heights[static_cast<std::size_t>(i)] = along_s ? map.texel(i, across) : map.texel(across, i);
-    const Roughness own = profile_roughness(heights, spacing);
-    mean.average += own.average / count;
-    mean.rms += own.rms / count;
-    mean.mean_slope += own.mean_slope / count;
+    add_share(mean, profile_roughness(heights, spacing), count);
   }
   return mean;
 }

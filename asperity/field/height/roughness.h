@@ -2,8 +2,6 @@
 // Roughness of measured and generated topographies, and what it predicts.
 
 #include <span>
-#include <string>
-#include <vector>
 
 #include "asperity/core/result.h"
 #include "asperity/field/height/map.h"

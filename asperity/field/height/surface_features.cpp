@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "asperity/core/rng.h"
-#include "asperity/core/suggest.h"
 #include "asperity/field/height/detail/texel_coordinate.h"
 
 namespace asperity {
@@ -25,30 +24,8 @@ constexpr int most_cells = 1 << 22;           // of noise: 16 MB
 constexpr int most_feature_texels = 1 << 26;  // of a baked map
 constexpr int most_side = 1 << 14;            // of a baked map
 
-struct FeatureEntry {
-  FeatureKind kind;
-  std::vector<std::string> parameters;
-};
-
-const std::vector<FeatureEntry>& feature_table() {
-  static const std::vector<FeatureEntry> all{
-      {FeatureKind::grating, {"amplitude", "wavelength", "direction", "phase"}},
-      {FeatureKind::circular_grating, {"amplitude", "wavelength", "phase", "centre"}},
-      {FeatureKind::grid, {"amplitude", "wavelength", "direction"}},
-      {FeatureKind::triangular, {"amplitude", "wavelength", "direction", "phase"}},
-      {FeatureKind::serrated, {"amplitude", "wavelength", "direction", "phase", "wall"}},
-      {FeatureKind::noise, {"roughness", "correlation_length", "seed", "period"}},
-      {FeatureKind::map, {"wavelength", "direction", "heights"}},
-  };
-  return all;
-}
-
-const FeatureEntry& kind_of(FeatureKind kind) {
-  return feature_table()[std::min(static_cast<std::size_t>(kind), feature_table().size() - 1)];
-}
-
 bool takes(FeatureKind kind, std::string_view member) {
-  const auto& all = kind_of(kind).parameters;
+  const auto& all = feature_parameters(kind);
   return std::find(all.begin(), all.end(), member) != all.end();
 }
 
@@ -111,24 +88,20 @@ struct Lattice {
 
 /// Mean square of the spline over its repeat, exact.
 double mean_square(const Lattice& lattice) {
-  Lattice along = lattice;
+  const auto correlated = [](const auto& at) {
+    double sum = covariance[0] * at(0);
+    for (int k = 1; k < 4; ++k) sum += covariance[static_cast<std::size_t>(k)] * (at(-k) + at(k));
+    return sum;
+  };
+  Lattice along{lattice.columns, lattice.rows, {}};
   for (int row = 0; row < lattice.rows; ++row) {
-    for (int column = 0; column < lattice.columns; ++column) {
-      double sum = covariance[0] * lattice.at(column, row);
-      for (int k = 1; k < 4; ++k)
-        sum += covariance[static_cast<std::size_t>(k)] * (lattice.at(column - k, row) + lattice.at(column + k, row));
-      along.values[static_cast<std::size_t>(row) * static_cast<std::size_t>(lattice.columns) +
-                   static_cast<std::size_t>(column)] = sum;
-    }
+    for (int column = 0; column < lattice.columns; ++column)
+      along.values.push_back(correlated([&](int k) { return lattice.at(column + k, row); }));
   }
   double total = 0.0;
   for (int row = 0; row < lattice.rows; ++row) {
-    for (int column = 0; column < lattice.columns; ++column) {
-      double sum = covariance[0] * along.at(column, row);
-      for (int k = 1; k < 4; ++k)
-        sum += covariance[static_cast<std::size_t>(k)] * (along.at(column, row - k) + along.at(column, row + k));
-      total += sum * lattice.at(column, row);
-    }
+    for (int column = 0; column < lattice.columns; ++column)
+      total += correlated([&](int k) { return along.at(column, row + k); }) * lattice.at(column, row);
   }
   return total / static_cast<double>(lattice.values.size());
 }
@@ -205,12 +178,9 @@ Status SurfaceFeature::prepare_noise() {
   ASPERITY_TRY(rows_, cells_along(spec_.period.y(), spacing));
   const std::int64_t cells = std::int64_t{columns_} * rows_;
   if (cells > most_cells) {
-    return Error{
-        ErrorCode::too_large,
-        fmt::format("makes {} x {} cells of noise", columns_, rows_),
-        {},
-        "period",
-        fmt::format("a period of at most {} cells in all: shorter, or a longer correlation length", most_cells)};
+    return refused(
+        ErrorCode::too_large, fmt::format("makes {} x {} cells of noise", columns_, rows_), "period",
+        fmt::format("a period of at most {} cells in all: shorter, or a longer correlation length", most_cells));
   }
   if (spec_.period.x() == 0.0) spec_.period.x() = columns_ * spacing;
   if (spec_.period.y() == 0.0) spec_.period.y() = rows_ * spacing;
@@ -236,7 +206,7 @@ Status SurfaceFeature::prepare_noise() {
 }
 
 Result<SurfaceFeature> SurfaceFeature::build(const FeatureSpec& spec) {
-  if (static_cast<std::size_t>(spec.kind) >= feature_table().size())
+  if (static_cast<std::size_t>(spec.kind) >= feature_names().size())
     return bad_value("is unknown", "kind", name_list<FeatureKind>());
   ASPERITY_CHECK(check_shape(spec));
   SurfaceFeature feature;
@@ -251,25 +221,18 @@ Result<SurfaceFeature> SurfaceFeature::build(const FeatureSpec& spec) {
   }
   feature.lowest_ = -spec.amplitude;
   feature.highest_ = spec.amplitude;
-  switch (spec.kind) {
-    case FeatureKind::grating:
-    case FeatureKind::circular_grating:
-    case FeatureKind::grid: break;
-    case FeatureKind::triangular:
-    case FeatureKind::serrated: {
-      const double wall = spec.kind == FeatureKind::triangular ? 0.5 : spec.wall;
-      feature.falling_share_ = 1.0 - wall;
-      feature.rise_ = 2.0 * spec.amplitude / (wall * spec.wavelength.x());
-      feature.fall_ = -2.0 * spec.amplitude / ((1.0 - wall) * spec.wavelength.x());
-      break;
-    }
-    case FeatureKind::noise: ASPERITY_CHECK(feature.prepare_noise()); break;
-    case FeatureKind::map:
-      feature.lowest_ = spec.heights->lowest();
-      feature.highest_ = spec.heights->highest();
-      feature.wavelength_ =
-          4.0 * std::min(spec.wavelength.x() / spec.heights->width(), spec.wavelength.y() / spec.heights->height());
-      break;
+  if (spec.kind == FeatureKind::triangular || spec.kind == FeatureKind::serrated) {
+    const double wall = spec.kind == FeatureKind::triangular ? 0.5 : spec.wall;
+    feature.falling_share_ = 1.0 - wall;
+    feature.rise_ = 2.0 * spec.amplitude / (wall * spec.wavelength.x());
+    feature.fall_ = -2.0 * spec.amplitude / ((1.0 - wall) * spec.wavelength.x());
+  }
+  if (spec.kind == FeatureKind::noise) ASPERITY_CHECK(feature.prepare_noise());
+  if (spec.kind == FeatureKind::map) {
+    feature.lowest_ = spec.heights->lowest();
+    feature.highest_ = spec.heights->highest();
+    feature.wavelength_ =
+        4.0 * std::min(spec.wavelength.x() / spec.heights->width(), spec.wavelength.y() / spec.heights->height());
   }
   return feature;
 }
@@ -377,15 +340,17 @@ const std::vector<std::string>& feature_names() {
   return all_names<FeatureKind>();
 }
 
-Result<FeatureKind> feature_by_name(std::string_view name) {
-  if (const std::optional<FeatureKind> kind = value_named<FeatureKind>(name)) return *kind;
-  const std::string near = nearest_name(name, feature_names());
-  return bad_value(fmt::format("is \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)),
-                   "kind", name_list<FeatureKind>());
-}
-
 const std::vector<std::string>& feature_parameters(FeatureKind kind) {
-  return kind_of(kind).parameters;
+  static const std::vector<std::string> of_kind[] = {
+      {"amplitude", "wavelength", "direction", "phase"},          // grating
+      {"amplitude", "wavelength", "phase", "centre"},             // circular_grating
+      {"amplitude", "wavelength", "direction"},                   // grid
+      {"amplitude", "wavelength", "direction", "phase"},          // triangular
+      {"amplitude", "wavelength", "direction", "phase", "wall"},  // serrated
+      {"roughness", "correlation_length", "seed", "period"},      // noise
+      {"wavelength", "direction", "heights"},                     // map
+  };
+  return of_kind[std::min(static_cast<std::size_t>(kind), std::size(of_kind) - 1)];
 }
 
 FeatureScales feature_scales(double resolution) noexcept {
@@ -418,16 +383,12 @@ Result<HeightMap> bake(const std::vector<SurfaceFeature>& features, const Vec2& 
     return refused(ErrorCode::too_large, fmt::format("is {} x {}", columns, rows), "texels",
                    fmt::format("at most {} along each axis and {} in all", most_side, most_feature_texels));
   }
-  std::vector<float> heights;
-  heights.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Vec2 place = lower + extent.cwiseProduct(Vec2((column + 0.5) / columns, (rows - row - 0.5) / rows));
-      double height = 0.0;
-      for (const SurfaceFeature& feature : features) height += feature.sample(place).height;
-      heights.push_back(static_cast<float>(height));
-    }
-  }
+  std::vector<float> heights = tabulated(columns, rows, [&](const Vec2& st) {
+    const Vec2 place = lower + extent.cwiseProduct(st);
+    double height = 0.0;
+    for (const SurfaceFeature& feature : features) height += feature.sample(place).height;
+    return height;
+  });
   return HeightMap::build(std::move(heights), columns, rows, wrap, Reconstruction::quadratic_bspline);
 }
 

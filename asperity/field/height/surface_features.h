@@ -58,9 +58,7 @@ struct FeatureSpec {
 
 /// "grating", "circular-grating", "grid", "triangular", "serrated", "noise", "map". [any]
 const char* feature_name(FeatureKind kind);
-/// Errors: bad_value listing the names. [any]
-Result<FeatureKind> feature_by_name(std::string_view name);
-/// Every name that feature_by_name accepts. [any]
+/// Every kind's name. [any]
 const std::vector<std::string>& feature_names();
 /// The members of FeatureSpec besides kind that a kind takes; scene files call them the same. [any]
 const std::vector<std::string>& feature_parameters(FeatureKind kind);

@@ -13,26 +13,6 @@
 namespace asperity {
 namespace {
 
-struct Kind {
-  MesostructureKind kind;
-  const char* paper;
-  std::array<std::string_view, 7> parameters;  // as many as are not empty
-};
-constexpr std::array<Kind, 8> kinds{{
-    {MesostructureKind::flat, "H_0", {}},
-    {MesostructureKind::serrated, "H_1", {"count", "wall"}},
-    {MesostructureKind::beams, "H_2", {"count", "width"}},
-    {MesostructureKind::rings, "H_3", {"number", "seed"}},
-    {MesostructureKind::warts, "H_4", {"number", "radius", "seed"}},
-    {MesostructureKind::coins, "H_5", {"number", "radius", "rim", "field", "flank", "overlap", "seed"}},
-    {MesostructureKind::groove, "H_6", {"width", "flank", "radius"}},
-    {MesostructureKind::fractal, "H_7", {"hurst", "octaves", "seed"}},
-}};
-
-Error unknown_kind() {
-  return bad_value("an unknown mesostructure", "kind", "one of the named kinds");
-}
-
 /// Whether a number lies in its closed range; `what` says which ("the width is").
 Status within(double value, double low, double high, const char* place, const char* what) {
   if (value >= low && value <= high) return success();
@@ -90,43 +70,62 @@ Status check_fractal(const MesostructureSpec& spec) {
   return within(*spec.octaves, 1, most, "octaves", "the number of octaves is");
 }
 
+Status check_rings(const MesostructureSpec& spec) {
+  return check_number(spec, 64);
+}
+
+Status check_warts(const MesostructureSpec& spec) {
+  ASPERITY_CHECK(check_number(spec, 2000));
+  return check_radii(*spec.radius);
+}
+
+struct Kind {
+  MesostructureKind kind;
+  const char* paper;
+  Status (*check)(const MesostructureSpec& spec);
+  MadeHeights (*heights)(const MesostructureSpec& spec);
+  std::array<std::string_view, 7> parameters;  // as many as are not empty
+};
+constexpr std::array<Kind, 8> kinds{{
+    {MesostructureKind::flat, "H_0", nullptr, flat_heights, {}},
+    {MesostructureKind::serrated, "H_1", check_serrated, serrated_heights, {"count", "wall"}},
+    {MesostructureKind::beams, "H_2", check_beams, beam_heights, {"count", "width"}},
+    {MesostructureKind::rings, "H_3", check_rings, ring_heights, {"number", "seed"}},
+    {MesostructureKind::warts, "H_4", check_warts, wart_heights, {"number", "radius", "seed"}},
+    {MesostructureKind::coins,
+     "H_5",
+     check_coins,
+     coin_heights,
+     {"number", "radius", "rim", "field", "flank", "overlap", "seed"}},
+    {MesostructureKind::groove, "H_6", check_groove, groove_heights, {"width", "flank", "radius"}},
+    {MesostructureKind::fractal, "H_7", check_fractal, fractal_heights, {"hurst", "octaves", "seed"}},
+}};
+
+const Kind* entry_of(MesostructureKind kind) {
+  const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& entry) { return entry.kind == kind; });
+  return found != kinds.end() ? &*found : nullptr;
+}
+
 /// `spec` is completed.
 Status check(const MesostructureSpec& spec) {
-  if (spec.size < 2 || spec.size > 8192) {
+  if (spec.size < 2 || spec.size > 8192)
     return bad_value(fmt::format("{} texels a side", spec.size), "size", "2 to 8192 texels");
-  }
   const bool flat = spec.kind == MesostructureKind::flat;
   if (!std::isfinite(spec.amplitude) || (spec.amplitude < 0.0 && !flat)) {
     return bad_value(fmt::format("the amplitude is {} m", spec.amplitude), "amplitude",
                      flat ? "a finite height" : "a finite length of 0 or more");
   }
-  switch (spec.kind) {
-    case MesostructureKind::flat: return success();
-    case MesostructureKind::serrated: return check_serrated(spec);
-    case MesostructureKind::beams: return check_beams(spec);
-    case MesostructureKind::rings: return check_number(spec, 64);
-    case MesostructureKind::warts: ASPERITY_CHECK(check_number(spec, 2000)); return check_radii(*spec.radius);
-    case MesostructureKind::coins: return check_coins(spec);
-    case MesostructureKind::groove: return check_groove(spec);
-    case MesostructureKind::fractal: return check_fractal(spec);
-  }
-  return unknown_kind();
-}
-
-/// The heights, when as many found a place as were asked for.
-Result<std::vector<float>> all_placed(ScatteredHeights scattered, const MesostructureSpec& spec) {
-  if (scattered.placed >= spec.number.value_or(0)) return std::move(scattered.heights);
-  return bad_value(fmt::format("only {} of {} find a place", scattered.placed, *spec.number), "number",
-                   "fewer, or smaller radii");
+  if (flat) return success();
+  const Kind* entry = entry_of(spec.kind);
+  return entry != nullptr ? entry->check(spec)
+                          : bad_value("an unknown mesostructure", "kind", "one of the named kinds");
 }
 
 }  // namespace
 
 const char* paper_name(MesostructureKind kind) {
-  for (const Kind& entry : kinds) {
-    if (entry.kind == kind) return entry.paper;
-  }
-  return "unknown";
+  const Kind* entry = entry_of(kind);
+  return entry != nullptr ? entry->paper : "unknown";
 }
 
 Result<MesostructureKind> parse_mesostructure_kind(std::string_view name) {
@@ -136,16 +135,13 @@ Result<MesostructureKind> parse_mesostructure_kind(std::string_view name) {
     if (name == to_string(entry.kind) || name == entry.paper || name == short_name) return entry.kind;
     accepted += fmt::format("{}{} ({})", accepted.empty() ? "" : ", ", to_string(entry.kind), entry.paper);
   }
-  return Error{ErrorCode::bad_value, fmt::format("no mesostructure is called '{}'", name), "", "", std::move(accepted)};
+  return bad_value(fmt::format("no mesostructure is called '{}'", name), {}, std::move(accepted));
 }
 
 std::span<const std::string_view> parameters_of(MesostructureKind kind) {
-  for (const Kind& entry : kinds) {
-    if (entry.kind != kind) continue;
-    const auto end = std::find(entry.parameters.begin(), entry.parameters.end(), std::string_view());
-    return {entry.parameters.begin(), end};
-  }
-  return {};
+  const Kind* entry = entry_of(kind);
+  if (entry == nullptr) return {};
+  return {entry->parameters.begin(), std::find(entry->parameters.begin(), entry->parameters.end(), std::string_view())};
 }
 
 MesostructureSpec completed(MesostructureSpec spec) {
@@ -179,17 +175,7 @@ MesostructureSpec completed(MesostructureSpec spec) {
 Result<std::vector<float>> generate_heights(const MesostructureSpec& given) {
   const MesostructureSpec spec = completed(given);
   ASPERITY_CHECK(check(spec));
-  switch (spec.kind) {
-    case MesostructureKind::flat: return flat_heights(spec);
-    case MesostructureKind::serrated: return serrated_heights(spec);
-    case MesostructureKind::beams: return beam_heights(spec);
-    case MesostructureKind::rings: return ring_heights(spec);
-    case MesostructureKind::warts: return all_placed(wart_heights(spec), spec);
-    case MesostructureKind::coins: return all_placed(coin_heights(spec), spec);
-    case MesostructureKind::groove: return groove_heights(spec);
-    case MesostructureKind::fractal: return fractal_heights(spec);
-  }
-  return unknown_kind();
+  return entry_of(spec.kind)->heights(spec);
 }
 
 Result<HeightMap> generate_height_map(const MesostructureSpec& spec, Wrap wrap, Reconstruction reconstruction) {

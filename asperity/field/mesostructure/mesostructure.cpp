@@ -22,17 +22,6 @@ constexpr int fewest_blocks_a_side = 16;
 /// Steepest slope that a given normal is read as; 8 bits tell no more.
 constexpr double least_outward = 1.0 / 127.0;
 
-// Below this a slope of the relief could leave the range of a double, and with it a force (m).
-
-/// Slopes of the heights (m/m) by central differences over two texels, whatever the reconstruction.
-Vec2 slope_of_heights(const HeightMap& heights, const Vec2& st, const Vec2& tile) {
-  const Vec2 ds(1.0 / heights.width(), 0.0);
-  const Vec2 dt(0.0, 1.0 / heights.height());
-  const double along_s = (heights.height_at(st + ds) - heights.height_at(st - ds)) * 0.5 * heights.width();
-  const double along_t = (heights.height_at(st + dt) - heights.height_at(st - dt)) * 0.5 * heights.height();
-  return {along_s / tile.x(), along_t / tile.y()};
-}
-
 Vec2 slope_of_normal(const Vec3& normal) {
   const double outward = std::max(normal.z(), least_outward);
   return {-normal.x() / outward, -normal.y() / outward};
@@ -77,7 +66,7 @@ SlopeGrid slopes_of(const HeightMap& heights, const NormalMap& normals, const Ve
       const auto x = static_cast<int>(static_cast<std::int64_t>(i) * width / grid.columns);
       const Vec2 st((x + 0.5) / width, 1.0 - (y + 0.5) / height);
       grid.given.push_back(slope_of_normal(normals.sample(st)));
-      grid.heights.push_back(slope_of_heights(heights, st, tile));
+      grid.heights.push_back(heights.central_slope(st).cwiseQuotient(tile));
     }
   }
   return grid;
@@ -153,10 +142,10 @@ Result<Mesostructure> Mesostructure::build(HeightMap heights, const Vec2& tile) 
 Result<Mesostructure> Mesostructure::build(HeightMap heights, NormalMap normals, const Vec2& tile) {
   ASPERITY_CHECK(check_tile(tile));
   if (heights.wrap() != normals.wrap()) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("the height map wraps by {}, its normal map by {}", to_string(heights.wrap()),
-                             to_string(normals.wrap())),
-                 "", "", "the same wrap for both"};
+    return refused(ErrorCode::mismatch,
+                   fmt::format("the height map wraps by {}, its normal map by {}", to_string(heights.wrap()),
+                               to_string(normals.wrap())),
+                   {}, "the same wrap for both");
   }
   return Mesostructure(std::move(heights), std::move(normals), tile);
 }
@@ -167,14 +156,19 @@ MesostructureSample Mesostructure::sample(const Vec2& st) const noexcept {
           normals_ ? normals_->sample(st) : normal_from_gradient(relief.gradient, tile_)};
 }
 
-HeightCurvature Mesostructure::curvature(const Vec2& st, double level) const noexcept {
-  if (level <= 0.0 || detail_ == nullptr) return heights_.curvature(st);
+Mesostructure::BetweenMaps Mesostructure::maps_at(double level) const noexcept {
+  if (level <= 0.0 || detail_ == nullptr) return {&heights_, nullptr, 0.0};
   const double felt = std::min(level, static_cast<double>(detail_->levels()));
   const int below = static_cast<int>(felt);
-  const double part = felt - below;
-  HeightCurvature mixed = below == 0 ? heights_.curvature(st) : detail_->map(below).curvature(st);
+  return {below == 0 ? &heights_ : &detail_->map(below), felt > below ? &detail_->map(below + 1) : nullptr,
+          felt - below};
+}
+
+HeightCurvature Mesostructure::curvature(const Vec2& st, double level) const noexcept {
+  const auto [lower, higher, part] = maps_at(level);
+  HeightCurvature mixed = lower->curvature(st);
   if (part <= 0.0) return mixed;
-  const HeightCurvature above = detail_->map(below + 1).curvature(st);
+  const HeightCurvature above = higher->curvature(st);
   mixed.height += part * (above.height - mixed.height);
   mixed.gradient += part * (above.gradient - mixed.gradient);
   mixed.ss += part * (above.ss - mixed.ss);
@@ -184,13 +178,10 @@ HeightCurvature Mesostructure::curvature(const Vec2& st, double level) const noe
 }
 
 HeightRange Mesostructure::range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept {
-  if (level <= 0.0 || detail_ == nullptr) return heights_.range_over(lower, upper);
-  const double felt = std::min(level, static_cast<double>(detail_->levels()));
-  const int below = static_cast<int>(felt);
-  const double part = felt - below;
-  HeightRange mixed = below == 0 ? heights_.range_over(lower, upper) : detail_->map(below).range_over(lower, upper);
+  const auto [finer, coarser, part] = maps_at(level);
+  const HeightRange mixed = finer->range_over(lower, upper);
   if (part <= 0.0) return mixed;
-  const HeightRange above = detail_->map(below + 1).range_over(lower, upper);
+  const HeightRange above = coarser->range_over(lower, upper);
   // Heights are mixed by another order of rounding than these bounds: a hair of room.
   const double room =
       1e-15 * (std::abs(mixed.lowest) + std::abs(mixed.highest) + std::abs(above.lowest) + std::abs(above.highest));
@@ -252,27 +243,17 @@ std::optional<std::string> disagreement_warning(const NormalAgreement& a) {
   if (std::abs(best) < related) {
     return fmt::format("the normal map does not belong to the heights {}; is it of the same picture?", numbers);
   }
-  if (a.green_flipped_fits_better && best > 0.0) {
-    return fmt::format(
-        "the normal map fits the heights with its green channel the other way round {}: try the other green "
-        "convention",
-        numbers);
-  }
-  if (a.green_flipped_fits_better) {
-    return fmt::format(
-        "the normal map fits the heights turned over and with its green channel the other way round {}: try "
-        "the other setting of white_is and the other green convention",
-        numbers);
-  }
-  if (best < 0.0) {
-    return fmt::format("the normal map fits the heights turned over {}: try the other setting of white_is", numbers);
+  const bool over = best < 0.0;
+  const bool flipped = a.green_flipped_fits_better;
+  const auto both = [&](const char* of_over, const char* of_flipped) {
+    return fmt::format("{}{}{}", over ? of_over : "", over && flipped ? " and " : "", flipped ? of_flipped : "");
+  };
+  if (over || flipped) {
+    return fmt::format("the normal map fits the heights {} {}: try {}",
+                       both("turned over", "with its green channel the other way round"), numbers,
+                       both("the other setting of white_is", "the other green convention"));
   }
   return fmt::format("the normal map only loosely follows the heights {}", numbers);
-}
-
-std::optional<double> implied_amplitude(const NormalAgreement& agreement, double amplitude) {
-  if (agreement.heights_flat || agreement.normals_flat || agreement.correlation < agrees) return std::nullopt;
-  return agreement.scale * amplitude;
 }
 
 }  // namespace asperity

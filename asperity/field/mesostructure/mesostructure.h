@@ -60,6 +60,14 @@ class Mesostructure {
  private:
   Mesostructure(HeightMap heights, std::optional<NormalMap> normals, const Vec2& tile);
 
+  /// The two maps that a level lies between, and the part of the way from the first to the second.
+  struct BetweenMaps {
+    const HeightMap* first;
+    const HeightMap* second;
+    double part;
+  };
+  [[nodiscard]] BetweenMaps maps_at(double level) const noexcept;
+
   HeightMap heights_;
   std::optional<NormalMap> normals_;
   std::shared_ptr<const DetailPyramid> detail_;
@@ -90,10 +98,5 @@ NormalAgreement compare_normals(const HeightMap& heights, const NormalMap& norma
 /// inverted heights, another picture); nothing when it does. Normal maps are authored with an unknown height scale, so
 /// a scale other than 1 alone is no disagreement. [build]
 std::optional<std::string> disagreement_warning(const NormalAgreement& agreement);
-
-/// The amplitude (m) at which the heights would have the slopes of the given normal map, as a hint to people who do not
-/// know their map's scale; nothing when they do not belong together. `amplitude` is the one the heights were built
-/// with. [build]
-std::optional<double> implied_amplitude(const NormalAgreement& agreement, double amplitude);
 
 }  // namespace asperity

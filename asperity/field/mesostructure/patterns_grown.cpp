@@ -1,6 +1,7 @@
 // Cloth, basketry, skin, wood, stone and sand.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -59,8 +60,6 @@ double cloth_height(const Cloth& cloth, const TileNoise& slubs, double s, double
   const double b = thread_height(cloth, y - weft - 0.5, x, std::min(weft_width, 1.0), -side);
   return std::max({a, b, -0.4});
 }
-
-}  // namespace
 
 Pattern linen_pattern(std::uint64_t seed) {
   const Cloth cloth{16, [](int warp, int weft) { return (warp + weft) % 2 == 0; }, 0.9, 0.55, 0.25, 0.06};
@@ -152,16 +151,14 @@ Pattern wood_pattern(std::uint64_t seed) {
       return x - std::floor(x);
     };
     const double now = year(s, t);
-    double height = 0.35 * now - 0.35 * smooth_step((now - 0.93) / 0.07) + 0.12 * fibre(s, t);
-    double pit = 0.0;
-    pores.near(s, t, 1, [&](double dx, double dy, int i, int j) {
+    const double height = 0.35 * now - 0.35 * smooth_step((now - 0.93) / 0.07) + 0.12 * fibre(s, t);
+    const double pit = pores.highest(s, t, 1, [&](double dx, double dy, int i, int j) {
       const double ps = s - dx / 72.0;
       const double pt = t - dy / 10.0;
       const bool early = pores.chance()(i, j, 3) < 1.1 * std::pow(1.0 - year(ps, pt), 2.0) + 0.06;
-      if (!early) return;
+      if (!early) return 0.0;
       const double length = 0.35 + 0.3 * pores.chance()(i, j, 4);
-      const double q = std::hypot(dx / 0.34, dy / length);
-      pit = std::max(pit, 1.0 - smooth_step(q));
+      return 1.0 - smooth_step(std::hypot(dx / 0.34, dy / length));
     });
     return height - 0.8 * pit;
   };
@@ -182,11 +179,10 @@ Pattern orange_pattern(std::uint64_t seed) {
   const ScatteredPoints pores(18, 18, 0.85, seed);
   const TileOctaves skin(6, 6, 2, 0.5, seed + 4);
   return [=](double s, double t) {
-    double pit = 0.0;
-    pores.near(s, t, 1, [&](double dx, double dy, int i, int j) {
+    const double pit = pores.highest(s, t, 1, [&](double dx, double dy, int i, int j) {
       const double size = 0.42 + 0.2 * pores.chance()(i, j, 3);
       const double inside = std::max(0.0, 1.0 - (dx * dx + dy * dy) / (size * size));
-      pit = std::max(pit, (0.4 + 0.6 * pores.chance()(i, j, 4)) * inside * inside * inside);
+      return (0.4 + 0.6 * pores.chance()(i, j, 4)) * inside * inside * inside;
     });
     const auto cell = pores.nearest(s, t);
     return 0.6 * skin(s, t) - pit + 0.12 * smooth_step(cell.first / 1.1);
@@ -201,7 +197,6 @@ Pattern scales_pattern(std::uint64_t seed) {
     const double x = s * columns;
     const double y = t * rows;
     // A scale hangs from its middle downwards; those of higher rows lie over those below them.
-    double height = 0.0;
     for (int k = 2; k >= -1; --k) {
       const int row = static_cast<int>(std::floor(y)) + k;
       const double shift = wrapped(row, 2) == 0 ? 0.0 : 0.5;
@@ -216,7 +211,7 @@ Pattern scales_pattern(std::uint64_t seed) {
       // The highest row whose scale covers the place is what is felt.
       return rim * (lift + growth + own) + (1.0 - rim) * 0.15;
     }
-    return height;
+    return 0.0;
   };
 }
 
@@ -226,17 +221,15 @@ Pattern pebbles_pattern(std::uint64_t seed) {
   const ScatteredPoints small(18, 18, 0.8, seed + 2);
   const TileOctaves grit(48, 48, 2, 0.6, seed + 9);
   const auto stones = [](const ScatteredPoints& points, double s, double t, double size) {
-    double height = 0.0;
-    points.near(s, t, 1, [&](double dx, double dy, int i, int j) {
+    return points.highest(s, t, 1, [&](double dx, double dy, int i, int j) {
       const CellChance& chance = points.chance();
       const double turn = pi * chance(i, j, 3);
       const double a = std::cos(turn) * dx + std::sin(turn) * dy;
       const double b = std::cos(turn) * dy - std::sin(turn) * dx;
       const double radius = size * (0.75 + 0.25 * chance(i, j, 4));
       const double q = std::hypot(a / radius, b / (radius * (0.6 + 0.35 * chance(i, j, 5))));
-      height = std::max(height, round_top(std::pow(q, 1.25)) * (0.7 + 0.3 * chance(i, j, 6)));
+      return round_top(std::pow(q, 1.25)) * (0.7 + 0.3 * chance(i, j, 6));
     });
-    return height;
   };
   return [=](double s, double t) {
     const double height =
@@ -256,6 +249,27 @@ Pattern sand_pattern(std::uint64_t seed) {
     const double profile = phase < 0.68 ? smooth_step(phase / 0.68) : smooth_step((1.0 - phase) / 0.32);
     return profile * (0.8 + 0.35 * strength(s, t)) + 0.04 * grains(s, t);
   };
+}
+
+constexpr std::array<PatternItem, 12> grown{{
+    {"linen", 11.2e-3, 0.35e-3, linen_pattern, "plain weave of uneven threads, 14 a centimetre"},
+    {"denim", 10e-3, 0.3e-3, denim_pattern, "twill three over one, 20 threads a centimetre"},
+    {"corduroy", 18e-3, 1.2e-3, corduroy_pattern, "ribbed velvet, eight wales an inch"},
+    {"knit", 24e-3, 1.5e-3, knit_pattern, "jersey knit, stitches of 4 mm x 3 mm"},
+    {"basket", 0.06, 3e-3, basket_pattern, "wicker of 5 mm, two over two"},
+    {"leather", 20e-3, 0.25e-3, leather_pattern, "full-grain cowhide, grains of 1 mm between creases"},
+    {"wood", 40e-3, 0.2e-3, wood_pattern, "planed and weathered oak, open pores along t"},
+    {"bark", 0.12, 8e-3, bark_pattern, "old tree's bark in plates with deep furrows"},
+    {"orange-peel", 22e-3, 0.3e-3, orange_pattern, "rind of an orange, pores of 1 mm"},
+    {"fish-scales", 56e-3, 0.6e-3, scales_pattern, "overlapping scales of 8 mm with growth rings"},
+    {"pebbles", 0.12, 12e-3, pebbles_pattern, "river gravel of 6 to 30 mm"},
+    {"ripple-sand", 0.64, 9e-3, sand_pattern, "sand rippled by wind, 80 mm from crest to crest"},
+}};
+
+}  // namespace
+
+std::span<const PatternItem> grown_patterns() {
+  return grown;
 }
 
 }  // namespace asperity

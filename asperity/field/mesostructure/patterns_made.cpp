@@ -37,8 +37,6 @@ double dome(double q, double share) {
   return (std::sqrt(1.0 - share * share * q * q) - edge) / (1.0 - edge);
 }
 
-}  // namespace
-
 // ---- built ------------------------------------------------------------------------------
 
 Pattern cobbles_pattern(std::uint64_t seed) {
@@ -88,13 +86,10 @@ Pattern roughcast_pattern(std::uint64_t seed) {
   const ScatteredPoints fine(34, 34, 0.95, seed + 1);
   const TileOctaves ground(6, 6, 5, 0.55, seed + 2);
   const auto thrown = [](const ScatteredPoints& points, double s, double t) {
-    double height = 0.0;
-    points.near(s, t, 1, [&](double dx, double dy, int i, int j) {
+    return points.highest(s, t, 1, [&](double dx, double dy, int i, int j) {
       const double radius = 0.3 + 0.3 * points.chance()(i, j, 3);
-      if (points.chance()(i, j, 4) > 0.75) return;
-      height = std::max(height, radius * dome(std::hypot(dx, dy) / radius, 0.9));
+      return points.chance()(i, j, 4) > 0.75 ? 0.0 : radius * dome(std::hypot(dx, dy) / radius, 0.9);
     });
-    return height;
   };
   return [=](double s, double t) {
     const double a = s + 0.01 * ground(s, t);
@@ -120,9 +115,8 @@ Pattern sandpaper_pattern(std::uint64_t seed) {
   const ScatteredPoints grit(18, 18, 0.95, seed);
   const TileOctaves resin(16, 16, 3, 0.5, seed + 1);
   return [=](double s, double t) {
-    double height = 0.0;
     // Grains are broken crystals: the lowest of six slanted faces about a point.
-    grit.near(s, t, 2, [&](double dx, double dy, int i, int j) {
+    const double height = grit.highest(s, t, 2, [&](double dx, double dy, int i, int j) {
       const CellChance& chance = grit.chance();
       const double size = 0.45 + 0.4 * chance(i, j, 3);
       double top = size * (0.75 + 0.35 * chance(i, j, 4));
@@ -133,7 +127,7 @@ Pattern sandpaper_pattern(std::uint64_t seed) {
         const double reach = 0.8 * size * (0.7 + 0.5 * chance(i, j, 20 + k));
         top = std::min(top, 2.2 * (reach - (std::cos(angle) * dx + std::sin(angle) * dy)));
       }
-      height = std::max(height, std::min(top, flat));
+      return std::min(top, flat);
     });
     return height + 0.12 * resin(s, t);
   };
@@ -304,6 +298,32 @@ Pattern studs_pattern(std::uint64_t seed) {
     const double q = 8.0 * std::hypot(from_whole(5.0 * s - 0.5), from_whole(5.0 * t - 0.5));
     return smooth_step((2.5 - q) / 0.25) + 0.002 * gloss(s, t);
   };
+}
+
+constexpr std::array<PatternItem, 17> made{{
+    {"cobblestones", 0.8, 25e-3, cobbles_pattern, "setts of 100 mm with rounded tops"},
+    {"bricks", 0.9, 10e-3, bricks_pattern, "wall of bricks of 215 mm x 65 mm with joints of 10 mm"},
+    {"roughcast", 80e-3, 4e-3, roughcast_pattern, "thrown plaster with grains of 2 to 6 mm"},
+    {"tactile-paving", 0.4, 5e-3, paving_pattern, "blister paving: domes of 25 mm, 67 mm apart, 5 mm high"},
+    {"sandpaper-p240", 1.3e-3, 45e-6, sandpaper_pattern, "abrasive paper P240, grains of 59 um"},
+    {"sandpaper-p80", 4.5e-3, 0.16e-3, sandpaper_pattern, "abrasive paper P80, grains of 0.2 mm"},
+    {"honeycomb", 37e-3, 1.5e-3, honeycomb_pattern, "wax cells of 5.3 mm with rounded walls"},
+    {"knurled-metal", 7e-3, 0.4e-3, knurl_pattern, "diamond knurl at 30 degrees, pitch 1 mm, tips worn"},
+    {"diamond-plate", 0.15, 1.8e-3, plate_pattern, "rolled tread plate, lozenges of 30 mm alternately turned"},
+    {"hammered-copper", 50e-3, 0.5e-3, hammered_pattern, "sheet beaten with a round hammer, blows of 6 mm"},
+    {"ball-milled-steel", 5e-3, 14e-6, milled_pattern, "passes of a ball-nosed cutter of 3 mm, 0.5 mm apart"},
+    {"brushed-steel", 10e-3, 6e-6, brushed_pattern, "steel brushed to a satin finish along s"},
+    {"file-teeth", 8e-3, 0.3e-3, file_pattern, "double-cut file, 15 teeth a centimetre"},
+    {"ribbed-rubber", 12e-3, 1.2e-3, ribs_pattern, "rubber mat with round ribs, 3 mm apart, along t"},
+    {"record-groove", 1.6e-3, 30e-6, record_pattern, "a record's grooves, 54 um wide, 100 um apart"},
+    {"braille", 0.06, 0.5e-3, braille_pattern, "six lines of braille: dots of 1.5 mm, 2.5 mm apart, 0.5 mm high"},
+    {"stud-plate", 40e-3, 1.7e-3, studs_pattern, "toy bricks' studs of 4.8 mm, 8 mm apart"},
+}};
+
+}  // namespace
+
+std::span<const PatternItem> made_patterns() {
+  return made;
 }
 
 }  // namespace asperity

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "asperity/core/rng.h"
-#include "asperity/core/suggest.h"
 
 namespace asperity {
 namespace {
@@ -206,14 +204,6 @@ CellJet noise_at(const Vec3& cells, std::uint64_t key) noexcept {
 
 }  // namespace
 
-Result<SolidKind> parse_solid_kind(const std::string& name) {
-  if (const std::optional<SolidKind> kind = value_named<SolidKind>(name)) return *kind;
-  const std::string meant = nearest_name(name, all_names<SolidKind>());
-  return bad_value(fmt::format("no solid mesostructure is called '{}'{}", name,
-                               meant.empty() ? std::string() : fmt::format(", did you mean '{}'?", meant)),
-                   "", name_list<SolidKind>());
-}
-
 Result<SolidMesostructure> SolidMesostructure::build(const SolidSpec& spec) {
   ASPERITY_CHECK(check(spec));
   SolidMesostructure solid;
@@ -283,8 +273,7 @@ SolidJet SolidMesostructure::ring_jet(const Vec3& p, double time) const noexcept
 SolidJet SolidMesostructure::noise_jet(const Vec3& p, double time) const noexcept {
   const Vec3 carried = p - time * spec_.drift;
   SolidJet jet;
-  for (int k = 0; k < spec_.octaves; ++k) {
-    const Octave& octave = octaves_[static_cast<std::size_t>(k)];
+  for (const Octave& octave : octaves()) {
     const CellJet cell = noise_at(octave.frequency * carried + octave.shift, octave.key);
     const double slope = octave.amplitude * octave.frequency;
     const double bend = slope * octave.frequency;
@@ -342,8 +331,7 @@ HeightRange SolidMesostructure::wave_range(const Vec3& axis, double amplitude, c
 HeightRange SolidMesostructure::noise_range(const Vec3& centre, const Vec3& half_extent, double time) const noexcept {
   const Vec3 carried = centre - time * spec_.drift;
   HeightRange range;
-  for (int k = 0; k < spec_.octaves; ++k) {
-    const Octave& octave = octaves_[static_cast<std::size_t>(k)];
+  for (const Octave& octave : octaves()) {
     const Vec3 half = octave.frequency * half_extent;
     const double radius = half.norm();
     double low = -most_noise;
@@ -411,16 +399,10 @@ double SolidMesostructure::grain() const noexcept {
 }
 
 double SolidMesostructure::most_speed() const noexcept {
-  switch (spec_.kind) {
-    case SolidKind::waves:
-    case SolidKind::lattice:
-    case SolidKind::rings: return two_pi * std::abs(spec_.frequency) * spec_.amplitude;
-    case SolidKind::pulse: return 0.5 * two_pi * spec_.frequency * spec_.amplitude;
-    case SolidKind::noise: break;
-  }
+  if (spec_.kind == SolidKind::pulse) return 0.5 * two_pi * spec_.frequency * spec_.amplitude;
+  if (spec_.kind != SolidKind::noise) return two_pi * std::abs(spec_.frequency) * spec_.amplitude;
   double slope = 0.0;
-  for (int k = 0; k < spec_.octaves; ++k) {
-    const Octave& octave = octaves_[static_cast<std::size_t>(k)];
+  for (const Octave& octave : octaves()) {
     slope += most_noise_slope * octave.amplitude * octave.frequency;
   }
   return slope * spec_.drift.norm();

@@ -3,7 +3,7 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+#include <span>
 
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
@@ -43,9 +43,6 @@ struct Names<SolidKind> {
                                                                  {SolidKind::noise, "noise"},
                                                                  {SolidKind::pulse, "pulse"}});
 };
-
-/// The kind of this name. Errors: bad_value (with the one probably meant). [build]
-Result<SolidKind> parse_solid_kind(const std::string& name);
 
 /// Its numbers. Metres and seconds, object frame. A member that a kind does not take is ignored.
 struct SolidSpec {
@@ -106,9 +103,12 @@ class SolidMesostructure {
     double amplitude = 0.0;     ///< m, times what the lattice answers
     std::uint64_t key = 0;
   };
+  [[nodiscard]] std::span<const Octave> octaves() const noexcept {
+    return std::span(octaves_).first(static_cast<std::size_t>(spec_.octaves));
+  }
   SolidSpec spec_;
   Mat3 axes_ = Mat3::Identity();     ///< of the lattice, columns
-  std::array<Octave, 8> octaves_{};  ///< spec_.octaves of them
+  std::array<Octave, 8> octaves_{};  ///< the first spec_.octaves are used
 };
 
 }  // namespace asperity

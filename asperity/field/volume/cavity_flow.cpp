@@ -99,9 +99,22 @@ struct Rolls {
   }
 };
 
-double across_wavenumber(const VolumeGenerator& g) {
-  return 2.0 * std::numbers::pi / g.extent->y();
-}
+/// All that the flow at a place is made of.
+struct CavityParts {
+  Undulation wave;
+  LayerTerm layer;
+  Eddy eddy;
+  Rolls rolls;
+
+  CavityParts(const VolumeGenerator& g, const Vec3& p) : CavityParts(g, p, 2.0 * std::numbers::pi / g.extent->y()) {}
+
+ private:
+  CavityParts(const VolumeGenerator& g, const Vec3& p, double across_wavenumber)
+      : wave(g, p, across_wavenumber),
+        layer((p.z() - 0.5 * g.extent->z()) / *g.thickness, wave.c),
+        eddy(g, p),
+        rolls(g, p, across_wavenumber) {}
+};
 
 }  // namespace
 
@@ -115,26 +128,16 @@ Result<CavityFlow> CavityFlow::build(const VolumeGenerator& generator) {
 }
 
 Vec3 CavityFlow::velocity(const Vec3& p) const noexcept {
-  const VolumeGenerator& g = generator_;
-  const double m = across_wavenumber(g);
-  const double d = *g.thickness;
-  const Undulation wave(g, p, m);
-  const LayerTerm layer((p.z() - 0.5 * g.extent->z()) / d, wave.c);
-  const Eddy eddy(g, p);
-  const Rolls rolls(g, p, m);
-  const double half = 0.5 * g.speed;
+  const auto [wave, layer, eddy, rolls] = CavityParts(generator_, p);
+  const double d = *generator_.thickness;
+  const double half = 0.5 * generator_.speed;
   return {half * (1.0 + layer.s) - eddy.z, rolls.z, -half * d * layer.p * wave.x + eddy.x - rolls.y};
 }
 
 Mat3 CavityFlow::gradient(const Vec3& p) const noexcept {
-  const VolumeGenerator& g = generator_;
-  const double m = across_wavenumber(g);
-  const double d = *g.thickness;
-  const Undulation wave(g, p, m);
-  const LayerTerm layer((p.z() - 0.5 * g.extent->z()) / d, wave.c);
-  const Eddy eddy(g, p);
-  const Rolls rolls(g, p, m);
-  const double half = 0.5 * g.speed;
+  const auto [wave, layer, eddy, rolls] = CavityParts(generator_, p);
+  const double d = *generator_.thickness;
+  const double half = 0.5 * generator_.speed;
   Mat3 out;
   out << half * layer.ac * wave.x - eddy.xz, half * layer.ac * wave.y, half * layer.aa / d - eddy.zz,  //
       0.0, rolls.yz, rolls.zz,                                                                         //

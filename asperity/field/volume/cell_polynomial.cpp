@@ -236,11 +236,10 @@ bool first_zero(const double* coefficients, double tolerance, double& t) noexcep
   constexpr int most_pieces = 64;
   constexpr double finest = 1e-15;
   Piece stack[most_pieces];
-  int top = 0;
+  int top = 1;
   std::copy(coefficients, coefficients + Count, stack[0].c);
   stack[0].low = 0.0;
   stack[0].high = 1.0;
-  ++top;
   while (top > 0) {
     Piece piece = stack[--top];
     bool negative = false;
@@ -257,15 +256,12 @@ bool first_zero(const double* coefficients, double tolerance, double& t) noexcep
     // One change of sign is one root: close enough is close enough.
     const double width = piece.high - piece.low;
     if (width < finest || top + 2 > most_pieces || (changes == 1 && width < tolerance)) {
-      t = piece.c[Count - 1] < 0.0 ? piece.high : 0.5 * (piece.low + piece.high);
-      if (changes == 1) {
-        // Within the piece the curve is all but straight.
-        const double from = piece.c[0];
-        const double to = piece.c[Count - 1];
-        t = piece.low + width * from / (from - to);
-        return true;
-      }
-      // Coefficients below 0 in a piece too short to halve: a touch within rounding.
+      const double from = piece.c[0];
+      const double to = piece.c[Count - 1];
+      // Within the piece the curve is all but straight. Coefficients below 0 in one that is too short to halve are a
+      // touch within rounding.
+      t = changes == 1 ? piece.low + width * from / (from - to)
+                       : (to < 0.0 ? piece.high : 0.5 * (piece.low + piece.high));
       return true;
     }
     Piece right = piece;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "asperity/core/parallel_for.h"
@@ -19,7 +18,7 @@ constexpr std::size_t parallel_nodes = std::size_t{1} << 18U;
 template <HasNames E>
 Result<E> parse_name(std::string_view name, const char* what) {
   if (const std::optional<E> value = value_named<E>(name)) return *value;
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no {}", name, what), "", "", name_list<E>()};
+  return bad_value(fmt::format("\"{}\" is no {}", name, what), {}, name_list<E>());
 }
 
 using AxisStencils = std::vector<DerivativeStencil>;
@@ -148,16 +147,15 @@ Status validate(const VectorGrid& grid) {
   std::size_t nodes = 1;
   for (const GridAxis& axis : grid.axes) nodes *= axis.size();
   if (nodes == 0 || grid.samples.size() != 3 * nodes) {
-    return Error{ErrorCode::mismatch,
-                 fmt::format("{} numbers on {} x {} x {} nodes", grid.samples.size(), grid.axes[0].size(),
-                             grid.axes[1].size(), grid.axes[2].size()),
-                 "", grid.name, "three numbers for each node"};
+    return refused(ErrorCode::mismatch,
+                   fmt::format("{} numbers on {} x {} x {} nodes", grid.samples.size(), grid.axes[0].size(),
+                               grid.axes[1].size(), grid.axes[2].size()),
+                   grid.name, "three numbers for each node");
   }
   const auto infinite = std::find_if(grid.samples.begin(), grid.samples.end(), [](float v) { return std::isinf(v); });
   if (infinite == grid.samples.end()) return success();
-  return Error{ErrorCode::bad_value, "is infinite", "",
-               fmt::format("{} vector {}", grid.name, (infinite - grid.samples.begin()) / 3),
-               "finite numbers, or NaN where nothing is known"};
+  return bad_value("is infinite", fmt::format("{} vector {}", grid.name, (infinite - grid.samples.begin()) / 3),
+                   "finite numbers, or NaN where nothing is known");
 }
 
 Result<ScalarGrid> derive(const VectorGrid& velocity, DerivedField field, const Progress& progress) {
@@ -182,9 +180,8 @@ Result<ScalarGrid> derive(const VectorGrid& velocity, DerivedField field, const 
 Result<ScalarGrid> derive(const ScalarGrid& grid, DerivedField field, const Progress& progress) {
   const char* name = to_string(field);
   if (field != DerivedField::gradient_magnitude) {
-    return Error{ErrorCode::bad_value,
-                 fmt::format("{} needs vectors, and \"{}\" holds one number a node", name, grid.name()), "", "derive",
-                 "gradient_magnitude, or a velocity"};
+    return bad_value(fmt::format("{} needs vectors, and \"{}\" holds one number a node", name, grid.name()), "derive",
+                     "gradient_magnitude, or a velocity");
   }
   const Slopes slopes(grid.axes(), 1);
   std::vector<float> samples = std::visit(

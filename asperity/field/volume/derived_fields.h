@@ -1,7 +1,6 @@
 #pragma once
 // Scalar fields computed from a velocity (large-data-2008, section 2), and slopes of any array.
 
-#include <optional>
 #include <string_view>
 
 #include "asperity/core/names.h"

@@ -32,13 +32,12 @@ constexpr std::array<VolumeEntry, 6> volume_table{{
 
 Status above_zero(double value, const char* place, const char* unit) {
   if (std::isfinite(value) && value > 0.0) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {:g} {}", value, unit), "", place,
-               fmt::format("a finite number above 0 ({})", unit)};
+  return bad_value(fmt::format("is {:g} {}", value, unit), place, fmt::format("a finite number above 0 ({})", unit));
 }
 
 Status within(double value, double low, double high, const char* place) {
   if (value >= low && value <= high) return success();
-  return Error{ErrorCode::bad_value, fmt::format("is {:g}", value), "", place, fmt::format("{:g} to {:g}", low, high)};
+  return bad_value(fmt::format("is {:g}", value), place, fmt::format("{:g} to {:g}", low, high));
 }
 
 /// How nodes are spread along an axis.
@@ -59,10 +58,6 @@ Result<GridAxis> spread(std::uint32_t count, double length, double ratio, Cluste
     nodes[i] = 0.5 * length * (1.0 + at);
   }
   return GridAxis::build(std::move(nodes));
-}
-
-double shortest_edge(const Vec3& extent) {
-  return extent.minCoeff();
 }
 
 /// `layer(k)` for every layer of nodes along z, on all cores where that pays.
@@ -103,9 +98,10 @@ std::size_t node_count(const GridAxes& axes) {
 
 Status fits_memory(const GridAxes& axes, std::size_t parts) {
   if (node_count(axes) * parts <= most_numbers) return success();
-  return Error{ErrorCode::too_large,
-               fmt::format("{} x {} x {} nodes do not fit into memory", axes[0].size(), axes[1].size(), axes[2].size()),
-               "", "size", fmt::format("{} nodes in all, or a bricked file (asperity convert)", most_numbers / parts)};
+  return refused(
+      ErrorCode::too_large,
+      fmt::format("{} x {} x {} nodes do not fit into memory", axes[0].size(), axes[1].size(), axes[2].size()), "size",
+      fmt::format("{} nodes in all, or a bricked file (asperity convert)", most_numbers / parts));
 }
 
 Status check_kind(const VolumeGenerator& g) {
@@ -124,8 +120,7 @@ Status check_kind(const VolumeGenerator& g) {
       return within(*g.thickness, 0.0, *g.wavelength / (4.0 * g.count), "thickness");
     case VolumeKind::ramp:
       if (!std::isfinite(g.gradient) || g.gradient == 0.0) {
-        return Error{ErrorCode::bad_value, fmt::format("is {:g}", g.gradient), "", "gradient",
-                     "a finite number, not 0"};
+        return bad_value(fmt::format("is {:g}", g.gradient), "gradient", "a finite number, not 0");
       }
       return within(*g.amplitude, 0.0, 1e30, "amplitude");
     case VolumeKind::waves:
@@ -133,7 +128,7 @@ Status check_kind(const VolumeGenerator& g) {
       return within(*g.amplitude, 0.0, 1e30, "amplitude");
     case VolumeKind::gyroid: return above_zero(*g.wavelength, "wavelength", "m");
   }
-  return Error{ErrorCode::bad_value, "an unknown volume", "", "kind", "one of the named kinds"};
+  return bad_value("an unknown volume", "kind", "one of the named kinds");
 }
 
 }  // namespace
@@ -149,8 +144,7 @@ std::span<const std::string_view> parameters_of(VolumeKind kind) {
 
 Result<VolumeKind> parse_volume_kind(std::string_view name) {
   if (const std::optional<VolumeKind> kind = value_named<VolumeKind>(name)) return *kind;
-  return Error{ErrorCode::bad_value, fmt::format("\"{}\" is no built-in volume", name), "", "",
-               name_list<VolumeKind>()};
+  return bad_value(fmt::format("\"{}\" is no built-in volume", name), {}, name_list<VolumeKind>());
 }
 
 VolumeGenerator completed(VolumeGenerator g) {
@@ -159,7 +153,7 @@ VolumeGenerator completed(VolumeGenerator g) {
     g.size = cavity ? std::array<std::uint32_t, 3>{259, 127, 128} : std::array<std::uint32_t, 3>{128, 128, 128};
   if (!g.extent) g.extent = cavity ? Vec3(0.2, 0.1, 0.1) : Vec3(0.1, 0.1, 0.1);
   if (!g.stretch) g.stretch = cavity ? 6.0 : 1.0;
-  const double side = shortest_edge(*g.extent);
+  const double side = g.extent->minCoeff();
   if (!g.radius) g.radius = 0.35 * side;
   if (!g.wavelength) {
     switch (g.kind) {
@@ -180,8 +174,8 @@ Status validate(const VolumeGenerator& generator) {
   const VolumeGenerator g = completed(generator);
   for (const std::uint32_t nodes : *g.size) {
     if (nodes < 2 || nodes > most_nodes) {
-      return Error{ErrorCode::bad_value, fmt::format("has {} nodes along an axis", nodes), "", "size",
-                   fmt::format("2 to {} nodes", most_nodes)};
+      return bad_value(fmt::format("has {} nodes along an axis", nodes), "size",
+                       fmt::format("2 to {} nodes", most_nodes));
     }
   }
   for (int axis = 0; axis < 3; ++axis) {
@@ -241,7 +235,7 @@ Result<std::variant<ScalarGrid, VectorGrid>> generate_volume(const VolumeGenerat
 Result<VolumeFunction> VolumeFunction::build(const VolumeGenerator& generator) {
   ASPERITY_CHECK(validate(generator));
   if (generator.kind == VolumeKind::cavity) {
-    return Error{ErrorCode::bad_value, "the cavity flow is made of vectors", "", "kind", "a scalar volume"};
+    return bad_value("the cavity flow is made of vectors", "kind", "a scalar volume");
   }
   VolumeFunction function;
   function.generator_ = completed(generator);

@@ -5,10 +5,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
 #include <string_view>
 #include <variant>
-#include <vector>
 
 #include "asperity/core/names.h"
 #include "asperity/core/progress.h"

@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
+
+#include "asperity/field/volume/places.h"
 
 namespace asperity {
 
@@ -17,21 +18,12 @@ Status check_channels(const PointMaterial& material, const std::string& place) {
   static constexpr const char* units[] = {" N/m", " N·s/m", "", "", ""};
   for (std::size_t channel = 0; channel < material_channels; ++channel) {
     const float value = material.get(channel);
-    if (std::isnan(value)) continue;
-    const bool above_zero = channel == 0;
-    if (std::isfinite(value) && (above_zero ? value > 0.0F : value >= 0.0F)) continue;
+    if (std::isnan(value) || fits_channel(channel, value)) continue;
     return bad_value(fmt::format("is {}{}", value, units[channel]),
                      fmt::format("{}.{}", place, material_channel_names()[channel]),
-                     fmt::format("a finite value, {}{}", above_zero ? "above 0" : "0 or more", units[channel]));
+                     fmt::format("a finite value, {}{}", channel == 0 ? "above 0" : "0 or more", units[channel]));
   }
   return success();
-}
-
-bool is_empty(const PointMaterial& material) {
-  for (std::size_t channel = 0; channel < material_channels; ++channel) {
-    if (!std::isnan(material.get(channel))) return false;
-  }
-  return true;
 }
 
 Status check_brush(const MaterialBrush& brush, const std::string& place) {
@@ -43,7 +35,10 @@ Status check_brush(const MaterialBrush& brush, const std::string& place) {
                      fmt::format("0 up to the radius, {} m", brush.radius));
   }
   ASPERITY_CHECK(check_channels(brush.material, place));
-  if (is_empty(brush.material)) {
+  bool empty = true;
+  for (std::size_t channel = 0; channel < material_channels; ++channel)
+    empty = empty && std::isnan(brush.material.get(channel));
+  if (empty) {
     return bad_value("gives no channel a value", place,
                      "at least one of stiffness, damping, static_friction, dynamic_friction, roughness");
   }
@@ -109,24 +104,19 @@ class Painting {
   bool lay_on(std::size_t b, const MaterialBrush& brush, std::size_t number) {
     SparseBlock& block = source_.blocks[b];
     bool reached = false;
-    for (int k = 0; k < SparseBlock::side; ++k) {
-      for (int j = 0; j < SparseBlock::side; ++j) {
-        for (int i = 0; i < SparseBlock::side; ++i) {
-          const double weight = weight_at(brush, (position(block, i, j, k) - brush.centre).norm());
-          if (!(weight > 0.0)) continue;
-          if (touched_[b].empty()) {
-            touched_[b].assign(SparseBlock::points, none);
-            block.material.resize(SparseBlock::points);
-          }
-          const std::size_t point = SparseBlock::index(i, j, k);
-          touched_[b][point] = static_cast<std::uint32_t>(number);
-          blend(brush.material, weight, block.material[point]);
-          const float value = block.value[point];
-          reached =
-              reached || (value < static_cast<float>(source_.outside) && value > static_cast<float>(source_.inside));
-        }
+    for_each_in_cube(0, SparseBlock::side, [&](int i, int j, int k) {
+      const double weight = weight_at(brush, (position(block, i, j, k) - brush.centre).norm());
+      if (!(weight > 0.0)) return;
+      if (touched_[b].empty()) {
+        touched_[b].assign(SparseBlock::points, none);
+        block.material.resize(SparseBlock::points);
       }
-    }
+      const std::size_t point = SparseBlock::index(i, j, k);
+      touched_[b][point] = static_cast<std::uint32_t>(number);
+      blend(brush.material, weight, block.material[point]);
+      const float value = block.value[point];
+      reached = reached || (value < static_cast<float>(source_.outside) && value > static_cast<float>(source_.inside));
+    });
     return reached;
   }
 

@@ -1,7 +1,9 @@
 #include "asperity/field/volume/min_max_octree.h"
 
-#include <algorithm>
 #include <cassert>
+#include <iterator>
+
+#include "asperity/field/volume/places.h"
 
 namespace asperity {
 
@@ -42,19 +44,17 @@ MinMaxOctree MinMaxOctree::build(const std::array<std::uint32_t, 3>& leaves, std
     Level& level = tree.levels_[l];
     const Level& below = tree.levels_[l - 1];
     level.ranges.resize(static_cast<std::size_t>(level.count(0)) * level.count(1) * level.count(2));
-    for (std::uint32_t k = 0; k < level.count(2); ++k) {
-      for (std::uint32_t j = 0; j < level.count(1); ++j) {
-        for (std::uint32_t i = 0; i < level.count(0); ++i) {
-          Node children[8];
-          const Node node{static_cast<std::uint8_t>(l), {i, j, k}};
-          const int count = tree.children(node, children);
-          ValueRange& range = level.ranges[level.index(i, j, k)];
-          for (int c = 0; c < count; ++c) {
-            range.include(below.ranges[below.index(children[c].at[0], children[c].at[1], children[c].at[2])]);
-          }
-        }
+    const std::uint32_t first[3] = {};
+    const std::uint32_t last[3] = {level.count(0), level.count(1), level.count(2)};
+    for_each_place(first, last, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+      Node children[8];
+      const Node node{static_cast<std::uint8_t>(l), {i, j, k}};
+      const int count = tree.children(node, children);
+      ValueRange& range = level.ranges[level.index(i, j, k)];
+      for (int c = 0; c < count; ++c) {
+        range.include(below.ranges[below.index(children[c].at[0], children[c].at[1], children[c].at[2])]);
       }
-    }
+    });
   }
   return tree;
 }
@@ -69,13 +69,9 @@ int MinMaxOctree::children(const Node& node, Node children[8]) const noexcept {
     last[a] = level.axes[a].child[node.at[a] + 1];
   }
   int written = 0;
-  for (std::uint32_t k = first[2]; k < last[2]; ++k) {
-    for (std::uint32_t j = first[1]; j < last[1]; ++j) {
-      for (std::uint32_t i = first[0]; i < last[0]; ++i) {
-        children[written++] = {static_cast<std::uint8_t>(node.level - 1), {i, j, k}};
-      }
-    }
-  }
+  for_each_place(first, last, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+    children[written++] = {static_cast<std::uint8_t>(node.level - 1), {i, j, k}};
+  });
   return written;
 }
 

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "asperity/core/math.h"
@@ -71,6 +70,13 @@ class MinMaxOctree {
   }
   [[nodiscard]] std::uint32_t last_cell(const Node& node, std::size_t axis) const noexcept {
     return levels_[node.level].axes[axis].leaf[node.at[axis] + 1] * leaf_cells_;
+  }
+  /// The same along all axes. [servo]
+  void cells_of(const Node& node, std::uint32_t first[3], std::uint32_t last[3]) const noexcept {
+    for (std::size_t a = 0; a < 3; ++a) {
+      first[a] = first_cell(node, a);
+      last[a] = last_cell(node, a);
+    }
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 

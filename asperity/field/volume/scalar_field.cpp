@@ -166,22 +166,23 @@ CellIndex ScalarField::grid_cell(int level, const Vec3& p) const noexcept {
   return {{a[0].locate(p.x()).cell, a[1].locate(p.y()).cell, a[2].locate(p.z()).cell}};
 }
 
-void ScalarField::fetch_samples(const CellIndex& cell, double out[64]) const noexcept {
+template <std::uint32_t Ring>
+void ScalarField::fetch_samples(const CellIndex& cell, double* out) const noexcept {
+  constexpr std::uint32_t count = 2 + 2 * Ring;
   const ScalarGrid& grid = *grid_;
-  std::uint32_t at[3][4];
+  std::uint32_t at[3][count];
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::uint32_t i = cell.at[a];
-    at[a][0] = i > 0 ? i - 1 : 0;
-    at[a][1] = i;
-    at[a][2] = i + 1;
-    at[a][3] = std::min(i + 2, grid.axis(a).size() - 1);
+    for (std::uint32_t n = 0; n < count; ++n) {
+      const std::uint32_t i = cell.at[a] + n;
+      at[a][n] = std::min(i > Ring ? i - Ring : 0, grid.axis(a).size() - 1);
+    }
   }
   std::visit(
       [&](const auto& samples) {
-        for (int k = 0; k < 4; ++k) {
-          for (int j = 0; j < 4; ++j) {
+        for (std::uint32_t k = 0; k < count; ++k) {
+          for (std::uint32_t j = 0; j < count; ++j) {
             const auto* row = samples.data() + grid.index(0, at[1][j], at[2][k]);
-            for (int i = 0; i < 4; ++i) *out++ = static_cast<double>(row[at[0][i]]);
+            for (std::uint32_t i = 0; i < count; ++i) *out++ = static_cast<double>(row[at[0][i]]);
           }
         }
       },
@@ -191,41 +192,24 @@ void ScalarField::fetch_samples(const CellIndex& cell, double out[64]) const noe
 bool ScalarField::gather(int level, const CellIndex& cell, CellPolynomial& out) const noexcept {
   out.owner = 0;
   out.known = false;
-  if (reconstruction_ == CellReconstruction::smooth) {
-    out.degree = 3;
-    if (bricks_) return bricks_->samples(level, cell, out.coefficient);
-    if (sparse_) {
-      sparse_->cell_samples(cell.at, 1, out.coefficient);
-      return true;
-    }
-    fetch_samples(cell, out.coefficient);
-    return true;
-  }
-  out.degree = 1;
+  const bool smooth = reconstruction_ == CellReconstruction::smooth;
+  out.degree = smooth ? 3 : 1;
   if (sparse_) {
-    sparse_->cell_samples(cell.at, 0, out.coefficient);
+    sparse_->cell_samples(cell.at, smooth ? 1 : 0, out.coefficient);
     return true;
   }
+  if (bricks_ && smooth) return bricks_->samples(level, cell, out.coefficient);
   if (bricks_) {
     double samples[64];
     if (!bricks_->samples(level, cell, samples)) return false;
     for (int corner = 0; corner < 8; ++corner) {
       out.coefficient[corner] = samples[(1 + (corner & 1)) + 4 * (1 + (corner >> 1 & 1)) + 16 * (1 + (corner >> 2))];
     }
-    return true;
+  } else if (smooth) {
+    fetch_samples<1>(cell, out.coefficient);
+  } else {
+    fetch_samples<0>(cell, out.coefficient);
   }
-  std::visit(
-      [&](const auto& samples) {
-        double* c = out.coefficient;
-        for (std::uint32_t k = 0; k < 2; ++k) {
-          for (std::uint32_t j = 0; j < 2; ++j) {
-            const auto* row = samples.data() + grid_->index(cell.at[0], cell.at[1] + j, cell.at[2] + k);
-            *c++ = static_cast<double>(row[0]);
-            *c++ = static_cast<double>(row[1]);
-          }
-        }
-      },
-      grid_->samples());
   return true;
 }
 

@@ -104,7 +104,9 @@ class ScalarField {
  private:
   [[nodiscard]] CellIndex grid_cell(int level, const Vec3& p) const noexcept;
   void finish();
-  void fetch_samples(const CellIndex& cell, double out[64]) const noexcept;
+  /// Of a grid in memory: the cell's own nodes and `Ring` more on every side, where the grid ends its last ones again.
+  template <std::uint32_t Ring>
+  void fetch_samples(const CellIndex& cell, double* out) const noexcept;
   /// Samples of a cell as the reconstruction needs them, 8 or 64. False where they are not here.
   bool gather(int level, const CellIndex& cell, CellPolynomial& out) const noexcept;
   void convert(int level, const CellIndex& cell, CellPolynomial& out) const noexcept;

@@ -8,61 +8,53 @@
 namespace asperity {
 
 std::size_t sample_bytes(SampleType type) {
-  switch (type) {
-    case SampleType::float32: return 4;
-    case SampleType::int16: return 2;
-    case SampleType::uint8: break;
-  }
-  return 1;
+  return with_samples_of(type, []<class Sample>() { return sizeof(Sample); });
 }
 
-Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::string name) {
-  for (const GridAxis& axis : axes) {
-    if (axis.size() < 2) {
-      return bad_value("has an axis without cells", name, "two nodes or more along each axis");
-    }
-  }
-  const std::size_t expected =
-      static_cast<std::size_t>(axes[0].size()) * axes[1].size() * static_cast<std::size_t>(axes[2].size());
-  ScalarGrid grid;
-  const auto take = [&](const auto& values) -> Status {
-    if (values.size() != expected) {
-      return refused(ErrorCode::mismatch,
-                     fmt::format("has {} samples for {} x {} x {} places", values.size(), axes[0].size(),
-                                 axes[1].size(), axes[2].size()),
-                     name, fmt::format("{} samples", expected));
-    }
-    double lowest = infinity;
-    double highest = -infinity;
-    std::size_t unknown = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const auto value = static_cast<double>(values[i]);
+Status SampleSurvey::take(const SampleArray& samples, const GridAxes& axes, std::size_t first_layer,
+                          const std::string& name) {
+  const auto take_all = [&](const auto& values) -> Status {
+    for (std::size_t n = 0; n < values.size(); ++n) {
+      const auto value = static_cast<double>(values[n]);
       if (std::isnan(value)) {
         ++unknown;
         continue;
       }
       if (std::isinf(value)) {
-        const std::size_t plane = static_cast<std::size_t>(axes[0].size()) * axes[1].size();
+        const std::size_t width = axes[0].size();
+        const std::size_t layer = width * axes[1].size();
         return bad_value("is infinite",
-                         fmt::format("{}{}sample ({}, {}, {})", name, name.empty() ? "" : ", ", i % axes[0].size(),
-                                     i % plane / axes[0].size(), i / plane),
+                         fmt::format("{}{}sample ({}, {}, {})", name, name.empty() ? "" : ", ", n % width,
+                                     n % layer / width, first_layer + n / layer),
                          "finite values, or not-a-number where nothing is known");
       }
       lowest = std::min(lowest, value);
       highest = std::max(highest, value);
     }
-    grid.lowest_ = lowest;
-    grid.highest_ = highest;
-    grid.unknown_ = unknown;
-    if (unknown == values.size()) {
-      return bad_value("holds no sample that is a number", name, "samples that are numbers");
-    }
     return success();
   };
-  ASPERITY_CHECK(std::visit(take, samples));
+  return std::visit(take_all, samples);
+}
+
+Result<ScalarGrid> ScalarGrid::build(GridAxes axes, SampleArray samples, std::string name) {
+  std::size_t expected = 1;
+  for (const GridAxis& axis : axes) {
+    if (axis.size() < 2) return bad_value("has an axis without cells", name, "two nodes or more along each axis");
+    expected *= axis.size();
+  }
+  ScalarGrid grid;
   grid.axes_ = std::move(axes);
   grid.samples_ = std::move(samples);
   grid.name_ = std::move(name);
+  if (grid.size() != expected) {
+    return refused(ErrorCode::mismatch,
+                   fmt::format("has {} samples for {} x {} x {} places", grid.size(), grid.axis(0).size(),
+                               grid.axis(1).size(), grid.axis(2).size()),
+                   grid.name_, fmt::format("{} samples", expected));
+  }
+  ASPERITY_CHECK(grid.survey_.take(grid.samples_, grid.axes_, 0, grid.name_));
+  if (grid.unknown() == expected)
+    return bad_value("holds no sample that is a number", grid.name_, "samples that are numbers");
   return grid;
 }
 

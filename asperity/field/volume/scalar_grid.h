@@ -22,11 +22,33 @@ struct Names<SampleType> {
 };
 /// Bytes of one sample. [any]
 std::size_t sample_bytes(SampleType type);
+/// What work.operator()<Sample>() answers for the type's own numbers. [any]
+template <class Work>
+decltype(auto) with_samples_of(SampleType type, const Work& work) {
+  switch (type) {
+    case SampleType::int16: return work.template operator()<std::int16_t>();
+    case SampleType::uint8: return work.template operator()<std::uint8_t>();
+    case SampleType::float32: break;
+  }
+  return work.template operator()<float>();
+}
 
 /// Samples in one of their types. x runs fastest, then y, then z.
 using SampleArray = std::variant<std::vector<float>, std::vector<std::int16_t>, std::vector<std::uint8_t>>;
 
 using GridAxes = std::array<GridAxis, 3>;
+
+/// Range and holes of samples that come in, some layers or all at once.
+struct SampleSurvey {
+  double lowest = infinity;
+  double highest = -infinity;
+  std::size_t unknown = 0;  ///< samples that are not numbers
+
+  /// Takes layers of a grid, `first_layer` the number of the first; `name` goes before the place in messages. Errors:
+  /// bad_value (an infinite sample). [build]
+  Status take(const SampleArray& samples, const GridAxes& axes, std::size_t first_layer = 0,
+              const std::string& name = {});
+};
 
 /// Scalar samples on a rectilinear grid, in memory, in the unit they came with. A float that is not a number marks a
 /// place where nothing is known.
@@ -49,9 +71,9 @@ class ScalarGrid {
   [[nodiscard]] std::size_t size() const noexcept {
     return std::visit([](const auto& s) { return s.size(); }, samples_);
   }
-  [[nodiscard]] double lowest() const noexcept { return lowest_; }
-  [[nodiscard]] double highest() const noexcept { return highest_; }
-  [[nodiscard]] std::size_t unknown() const noexcept { return unknown_; }  ///< samples that are not numbers
+  [[nodiscard]] double lowest() const noexcept { return survey_.lowest; }
+  [[nodiscard]] double highest() const noexcept { return survey_.highest; }
+  [[nodiscard]] std::size_t unknown() const noexcept { return survey_.unknown; }  ///< samples that are not numbers
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] Box bounds() const noexcept {
     return {{axes_[0].front(), axes_[1].front(), axes_[2].front()},
@@ -67,9 +89,7 @@ class ScalarGrid {
   GridAxes axes_;
   SampleArray samples_;
   std::string name_;
-  double lowest_ = 0.0;
-  double highest_ = 0.0;
-  std::size_t unknown_ = 0;
+  SampleSurvey survey_;
 };
 
 /// A value that splits the samples in two classes that differ most (Otsu 1979): the threshold when nobody names one.

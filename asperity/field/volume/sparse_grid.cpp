@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asperity/core/identity.h"
+#include "asperity/field/volume/places.h"
 
 namespace asperity {
 
@@ -15,6 +16,10 @@ constexpr int block_side = SparseBlock::side;
 constexpr int apron_side = SparseGrid::brick_side;
 constexpr int material_side = block_side + 1;
 constexpr std::size_t material_points = material_side * material_side * material_side;
+/// Place of a point's material in its brick, 0 … 8 along each axis.
+constexpr std::size_t material_index(int i, int j, int k) noexcept {
+  return static_cast<std::size_t>(i + material_side * (j + material_side * k));
+}
 constexpr std::size_t most_table = std::size_t{1} << 27;  // 4,096 voxels a side, some 2 GB
 
 /// Place of a point of a brick's apron, -1 … 9 along each axis.
@@ -22,18 +27,15 @@ constexpr std::size_t apron_index(int i, int j, int k) noexcept {
   return static_cast<std::size_t>(i + 1 + apron_side * (j + 1 + apron_side * (k + 1)));
 }
 
-Status check_material(const PointMaterial& m, const std::string& place) {
-  const auto good = [](float value, bool fits) { return std::isnan(value) || (std::isfinite(value) && fits); };
-  if (!good(m.stiffness, m.stiffness > 0.0F))
-    return bad_value(fmt::format("is {}", m.stiffness), place + ".stiffness", "above 0 (N/m)");
-  if (!good(m.damping, m.damping >= 0.0F))
-    return bad_value(fmt::format("is {}", m.damping), place + ".damping", "0 or more (N·s/m)");
-  if (!good(m.static_friction, m.static_friction >= 0.0F))
-    return bad_value(fmt::format("is {}", m.static_friction), place + ".static_friction", "0 or more");
-  if (!good(m.dynamic_friction, m.dynamic_friction >= 0.0F))
-    return bad_value(fmt::format("is {}", m.dynamic_friction), place + ".dynamic_friction", "0 or more");
-  if (!good(m.roughness, m.roughness >= 0.0F))
-    return bad_value(fmt::format("is {}", m.roughness), place + ".roughness", "0 or more");
+Status check_material(const PointMaterial& material, const std::string& place) {
+  static constexpr const char* accepted[] = {"above 0 (N/m)", "0 or more (N·s/m)", "0 or more", "0 or more",
+                                             "0 or more"};
+  for (std::size_t channel = 0; channel < material_channels; ++channel) {
+    const float value = material.get(channel);
+    if (std::isnan(value) || fits_channel(channel, value)) continue;
+    return bad_value(fmt::format("is {}", value), fmt::format("{}.{}", place, material_channel_names()[channel]),
+                     accepted[channel]);
+  }
   return success();
 }
 
@@ -47,23 +49,25 @@ Status check_block(const SparseBlock& block, std::size_t number) {
     if (!std::isfinite(block.value[i]))
       return bad_value("is not a finite number", fmt::format("{}.value[{}]", place, i), "distances (m)");
   }
-  if (!block.face.empty() && block.face.size() != SparseBlock::points)
-    return bad_value(fmt::format("has {} entries", block.face.size()), place + ".face", "512 or none");
-  if (!block.material.empty() && block.material.size() != SparseBlock::points)
-    return bad_value(fmt::format("has {} entries", block.material.size()), place + ".material", "512 or none");
+  for (const auto& [entries, part] : {std::pair(block.face.size(), ".face"), {block.material.size(), ".material"}}) {
+    if (entries != 0 && entries != SparseBlock::points)
+      return bad_value(fmt::format("has {} entries", entries), place + part, "512 or none");
+  }
   for (std::size_t i = 0; i < block.material.size(); ++i)
     ASPERITY_CHECK(check_material(block.material[i], fmt::format("{}.material[{}]", place, i)));
   return success();
 }
 
 Status check_source(const SparseSource& source) {
-  if (!(source.voxel > 0.0) || !std::isfinite(source.voxel))
-    return bad_value(fmt::format("is {}", source.voxel), "voxel", "a length above 0 (m)");
+  const auto check_length = [](double value, double sign, const char* place) -> Status {
+    if (sign * value > 0.0 && std::isfinite(value)) return success();
+    return bad_value(fmt::format("is {}", value), place,
+                     fmt::format("a length {} 0 (m)", sign > 0.0 ? "above" : "below"));
+  };
+  ASPERITY_CHECK(check_length(source.voxel, 1.0, "voxel"));
   if (!source.origin.allFinite()) return bad_value("is not finite", "origin", "three finite lengths (m)");
-  if (!(source.outside > 0.0) || !std::isfinite(source.outside))
-    return bad_value(fmt::format("is {}", source.outside), "outside", "a length above 0 (m)");
-  if (!(source.inside < 0.0) || !std::isfinite(source.inside))
-    return bad_value(fmt::format("is {}", source.inside), "inside", "a length below 0 (m)");
+  ASPERITY_CHECK(check_length(source.outside, 1.0, "outside"));
+  ASPERITY_CHECK(check_length(source.inside, -1.0, "inside"));
   if (source.blocks.empty()) return bad_value("holds none", "blocks", "at least one block");
   if (source.blocks.size() > SparseGrid::most_bricks) {
     return refused(ErrorCode::too_large, fmt::format("holds {} blocks", source.blocks.size()), "blocks",
@@ -73,11 +77,40 @@ Status check_source(const SparseSource& source) {
   return success();
 }
 
+/// Value and gradient of the trilinear interpolant of eight corners, x fastest.
+inline Potential interpolated(const double c[8], const double at[3], double per_voxel) noexcept {
+  const double u = at[0];
+  const double v = at[1];
+  const double w = at[2];
+  const double x00 = c[1] - c[0];
+  const double x10 = c[3] - c[2];
+  const double x01 = c[5] - c[4];
+  const double x11 = c[7] - c[6];
+  const double y0 = c[0] + u * x00;
+  const double y1 = c[2] + u * x10;
+  const double y2 = c[4] + u * x01;
+  const double y3 = c[6] + u * x11;
+  const double low = y0 + v * (y1 - y0);
+  const double high = y2 + v * (y3 - y2);
+  const double gx_low = x00 + v * (x10 - x00);
+  const double gx_high = x01 + v * (x11 - x01);
+  const double gy_low = y1 - y0;
+  Potential out;
+  out.value = low + w * (high - low);
+  out.gradient = Vec3(per_voxel * (gx_low + w * (gx_high - gx_low)), per_voxel * (gy_low + w * ((y3 - y2) - gy_low)),
+                      per_voxel * (high - low));
+  return out;
+}
+
 }  // namespace
 
 std::span<const char* const> material_channel_names() {
   static constexpr const char* names[] = {"stiffness", "damping", "static_friction", "dynamic_friction", "roughness"};
   return names;
+}
+
+bool fits_channel(std::size_t channel, float value) noexcept {
+  return std::isfinite(value) && (channel == 0 ? value > 0.0F : value >= 0.0F);
 }
 
 /// Marks what is beyond the band as outside or inside: each connected part takes the side of the stored points that it
@@ -136,48 +169,36 @@ void SparseGrid::fill(const std::vector<const SparseBlock*>& blocks, const std::
     const SparseBlock* around[3][3][3];
     float beyond[3][3][3];
     bool any_material = false;
-    for (int z = 0; z < 3; ++z) {
-      for (int y = 0; y < 3; ++y) {
-        for (int x = 0; x < 3; ++x) {
-          const auto at = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + (x - 1) + (y - 1) * step_y +
-                                                   (z - 1) * step_z);
-          around[z][y][x] = blocks[at];
-          beyond[z][y][x] = table_[at] < 0 ? constant(table_[at]) : 0.0F;
-          const bool reaches = x > 0 && y > 0 && z > 0;
-          any_material = any_material || (reaches && blocks[at] != nullptr && !blocks[at]->material.empty());
-        }
-      }
-    }
+    for_each_in_cube(0, 3, [&](int x, int y, int z) {
+      const auto at =
+          static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + (x - 1) + (y - 1) * step_y + (z - 1) * step_z);
+      around[z][y][x] = blocks[at];
+      beyond[z][y][x] = table_[at] < 0 ? constant(table_[at]) : 0.0F;
+      const bool reaches = x > 0 && y > 0 && z > 0;
+      any_material = any_material || (reaches && blocks[at] != nullptr && !blocks[at]->material.empty());
+    });
     auto brick = std::make_shared<Brick>();
-    for (int k = -1; k <= block_side + 1; ++k) {
+    for_each_in_cube(-1, block_side + 2, [&](int i, int j, int k) {
+      const int x = (i + block_side) / block_side;
+      const int y = (j + block_side) / block_side;
       const int z = (k + block_side) / block_side;
-      for (int j = -1; j <= block_side + 1; ++j) {
-        const int y = (j + block_side) / block_side;
-        for (int i = -1; i <= block_side + 1; ++i) {
-          const int x = (i + block_side) / block_side;
-          const SparseBlock* from = around[z][y][x];
-          brick->value[apron_index(i, j, k)] =
-              from != nullptr ? from->value[SparseBlock::index(i - (x - 1) * block_side, j - (y - 1) * block_side,
-                                                               k - (z - 1) * block_side)]
-                              : beyond[z][y][x];
-        }
-      }
-    }
+      const SparseBlock* from = around[z][y][x];
+      brick->value[apron_index(i, j, k)] =
+          from != nullptr ? from->value[SparseBlock::index(i - (x - 1) * block_side, j - (y - 1) * block_side,
+                                                           k - (z - 1) * block_side)]
+                          : beyond[z][y][x];
+    });
     const SparseBlock& own = *around[1][1][1];
     brick->face = own.face;
     brick->owns_material = !own.material.empty();
     if (any_material) {
       brick->material.resize(material_points);
-      for (int k = 0; k < material_side; ++k) {
-        for (int j = 0; j < material_side; ++j) {
-          for (int i = 0; i < material_side; ++i) {
-            const SparseBlock* from = around[1 + k / block_side][1 + j / block_side][1 + i / block_side];
-            if (from == nullptr || from->material.empty()) continue;
-            brick->material[static_cast<std::size_t>(i + material_side * (j + material_side * k))] =
-                from->material[SparseBlock::index(i % block_side, j % block_side, k % block_side)];
-          }
-        }
-      }
+      for_each_in_cube(0, material_side, [&](int i, int j, int k) {
+        const SparseBlock* from = around[1 + k / block_side][1 + j / block_side][1 + i / block_side];
+        if (from == nullptr || from->material.empty()) return;
+        brick->material[material_index(i, j, k)] =
+            from->material[SparseBlock::index(i % block_side, j % block_side, k % block_side)];
+      });
     }
     bricks_[static_cast<std::size_t>(table_[entry])] = std::move(brick);
   }
@@ -189,46 +210,42 @@ void SparseGrid::finish() {
   has_faces_ = true;
   has_materials_ = false;
   std::vector<ValueRange> ranges(table_.size());
-  for (std::uint32_t k = 0; k < counts_[2]; ++k) {
-    for (std::uint32_t j = 0; j < counts_[1]; ++j) {
-      for (std::uint32_t i = 0; i < counts_[0]; ++i) {
-        const std::size_t entry = table_index(i, j, k);
-        ValueRange& range = ranges[entry];
-        if (table_[entry] >= 0) {
-          const Brick& brick = *bricks_[static_cast<std::size_t>(table_[entry])];
-          for (const float value : brick.value) range.include({value, value});
-          has_faces_ = has_faces_ && !brick.face.empty();
-          has_materials_ = has_materials_ || brick.owns_material;
-          lowest_ = std::min(lowest_, range.lower);
-          highest_ = std::max(highest_, range.upper);
-          continue;
-        }
-        const float value = constant(table_[entry]);
-        range.include({value, value});
-        // Its outermost cells and their rings reach into stored neighbours.
-        bool lonely = true;
-        for (std::uint32_t z = k - std::min(k, 1U); z <= std::min(k + 1, counts_[2] - 1) && lonely; ++z) {
-          for (std::uint32_t y = j - std::min(j, 1U); y <= std::min(j + 1, counts_[1] - 1) && lonely; ++y) {
-            for (std::uint32_t x = i - std::min(i, 1U); x <= std::min(i + 1, counts_[0] - 1) && lonely; ++x)
-              lonely = table_[table_index(x, y, z)] < 0;
-          }
-        }
-        if (lonely) continue;
-        double samples[64];
-        for (const std::uint32_t z : {0U, 3U, 6U, 7U}) {
-          for (const std::uint32_t y : {0U, 3U, 6U, 7U}) {
-            for (const std::uint32_t x : {0U, 3U, 6U, 7U}) {
-              const std::uint32_t cell[3] = {block_side * i + x, block_side * j + y, block_side * k + z};
-              // Rings of four nodes from these cells on cover all that the brick's cells read at its border.
-              cell_samples(cell, 1, samples);
-              for (const double sample : samples)
-                range.include({static_cast<float>(sample), static_cast<float>(sample)});
-            }
-          }
-        }
-      }
+  for_each_place(std::array<std::uint32_t, 3>{}, counts_, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+    const std::size_t entry = table_index(i, j, k);
+    ValueRange& range = ranges[entry];
+    if (table_[entry] >= 0) {
+      const Brick& brick = *bricks_[static_cast<std::size_t>(table_[entry])];
+      for (const float value : brick.value) range.include({value, value});
+      has_faces_ = has_faces_ && !brick.face.empty();
+      has_materials_ = has_materials_ || brick.owns_material;
+      lowest_ = std::min(lowest_, range.lower);
+      highest_ = std::max(highest_, range.upper);
+      return;
     }
-  }
+    const float value = constant(table_[entry]);
+    range.include({value, value});
+    // Its outermost cells and their rings reach into stored neighbours.
+    std::array<std::uint32_t, 3> first{i, j, k};
+    std::array<std::uint32_t, 3> last{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      last[a] = std::min(first[a] + 2, counts_[a]);
+      first[a] -= std::min(first[a], 1U);
+    }
+    bool lonely = true;
+    for_each_place(first, last, [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+      lonely = lonely && table_[table_index(x, y, z)] < 0;
+    });
+    if (lonely) return;
+    constexpr std::uint32_t outermost[4] = {0, 3, 6, 7};
+    double samples[64];
+    for_each_in_cube(0, 4, [&](int x, int y, int z) {
+      const std::uint32_t cell[3] = {block_side * i + outermost[x], block_side * j + outermost[y],
+                                     block_side * k + outermost[z]};
+      // Rings of four nodes from these cells on cover all that the brick's cells read at its border.
+      cell_samples(cell, 1, samples);
+      for (const double sample : samples) range.include({static_cast<float>(sample), static_cast<float>(sample)});
+    });
+  });
   for (std::size_t a = 0; a < 3; ++a) extent_[static_cast<int>(a)] = static_cast<double>(brick_cells) * counts_[a];
   octree_ = MinMaxOctree::build(counts_, brick_cells, std::move(ranges));
 }
@@ -290,16 +307,11 @@ SparseBlock SparseGrid::block_of(std::size_t entry) const {
               first_[1] + static_cast<std::int32_t>(entry / counts_[0] % counts_[1]),
               first_[2] + static_cast<std::int32_t>(entry / counts_[0] / counts_[1])};
   if (brick.owns_material) block.material.resize(SparseBlock::points);
-  for (int k = 0; k < block_side; ++k) {
-    for (int j = 0; j < block_side; ++j) {
-      for (int i = 0; i < block_side; ++i) {
-        const std::size_t at = SparseBlock::index(i, j, k);
-        block.value[at] = brick.value[apron_index(i, j, k)];
-        if (brick.owns_material)
-          block.material[at] = brick.material[static_cast<std::size_t>(i + material_side * (j + material_side * k))];
-      }
-    }
-  }
+  for_each_in_cube(0, block_side, [&](int i, int j, int k) {
+    const std::size_t at = SparseBlock::index(i, j, k);
+    block.value[at] = brick.value[apron_index(i, j, k)];
+    if (brick.owns_material) block.material[at] = brick.material[material_index(i, j, k)];
+  });
   block.face = brick.face;
   return block;
 }
@@ -324,12 +336,9 @@ Result<SparseGrid> SparseGrid::edited(std::vector<SparseBlock> changed) const {
   const auto step_y = static_cast<std::ptrdiff_t>(counts_[0]);
   const std::ptrdiff_t step_z = step_y * static_cast<std::ptrdiff_t>(counts_[1]);
   const auto around = [&](std::size_t entry, const auto& visit) {
-    for (int z = -1; z <= 1; ++z) {
-      for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x)
-          visit(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + x + y * step_y + z * step_z));
-      }
-    }
+    for_each_in_cube(-1, 2, [&](int x, int y, int z) {
+      visit(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(entry) + x + y * step_y + z * step_z));
+    });
   };
   for (std::size_t b = 0; b < changed.size(); ++b) {
     const SparseBlock& block = changed[b];
@@ -465,74 +474,38 @@ const SparseGrid::Brick* SparseGrid::locate(const Vec3& p, SparseHint& hint, Pla
   return static_cast<const Brick*>(hint.brick);
 }
 
-namespace {
-
-/// Value and gradient of the trilinear interpolant of eight corners, x fastest.
-inline Potential interpolated(const double c[8], const double at[3], double per_voxel) noexcept {
-  const double u = at[0];
-  const double v = at[1];
-  const double w = at[2];
-  const double x00 = c[1] - c[0];
-  const double x10 = c[3] - c[2];
-  const double x01 = c[5] - c[4];
-  const double x11 = c[7] - c[6];
-  const double y0 = c[0] + u * x00;
-  const double y1 = c[2] + u * x10;
-  const double y2 = c[4] + u * x01;
-  const double y3 = c[6] + u * x11;
-  const double low = y0 + v * (y1 - y0);
-  const double high = y2 + v * (y3 - y2);
-  const double gx_low = x00 + v * (x10 - x00);
-  const double gx_high = x01 + v * (x11 - x01);
-  const double gy_low = y1 - y0;
-  Potential out;
-  out.value = low + w * (high - low);
-  out.gradient = Vec3(per_voxel * (gx_low + w * (gx_high - gx_low)), per_voxel * (gy_low + w * ((y3 - y2) - gy_low)),
-                      per_voxel * (high - low));
-  return out;
+template <int Ring>
+bool SparseGrid::nodes_around(const Vec3& p, SparseHint& hint, Place& place, double* out) const noexcept {
+  constexpr int count = 2 + 2 * Ring;
+  if (const Brick* brick = locate(p, hint, place)) {
+    const float* first =
+        brick->value + apron_index(static_cast<int>(place.cell[0]) - Ring, static_cast<int>(place.cell[1]) - Ring,
+                                   static_cast<int>(place.cell[2]) - Ring);
+    for (int k = 0; k < count; ++k) {
+      for (int j = 0; j < count; ++j) {
+        for (int i = 0; i < count; ++i) *out++ = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
+      }
+    }
+    return true;
+  }
+  if (hint.owner == 0) return false;
+  std::uint32_t cell[3];
+  for (std::size_t a = 0; a < 3; ++a) cell[a] = brick_cells * hint.at[a] + place.cell[a];
+  cell_samples(cell, Ring, out);
+  return true;
 }
-
-}  // namespace
 
 Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept {
   Place place;
-  const Brick* brick = locate(p, hint, place);
   double c[8];
-  if (brick != nullptr) {
-    const float* v = brick->value + apron_index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
-                                                static_cast<int>(place.cell[2]));
-    constexpr int y = apron_side;
-    constexpr int z = apron_side * apron_side;
-    const float corners[8] = {v[0], v[1], v[y], v[y + 1], v[z], v[z + 1], v[z + y], v[z + y + 1]};
-    for (int n = 0; n < 8; ++n) c[n] = static_cast<double>(corners[n]);
-  } else {
-    if (hint.owner == 0) return {outside_, Vec3::Zero()};
-    std::uint32_t cell[3];
-    cell_of(hint, place, cell);
-    cell_samples(cell, 0, c);
-  }
+  if (!nodes_around<0>(p, hint, place, c)) return {outside_, Vec3::Zero()};
   return interpolated(c, place.fraction, per_voxel_);
 }
 
 Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
   Place place;
-  const Brick* brick = locate(p, hint, place);
   double c[64];
-  if (brick != nullptr) {
-    for (int k = 0; k < 4; ++k) {
-      for (int j = 0; j < 4; ++j) {
-        const float* row =
-            brick->value + apron_index(static_cast<int>(place.cell[0]) - 1, static_cast<int>(place.cell[1]) - 1 + j,
-                                       static_cast<int>(place.cell[2]) - 1 + k);
-        for (int i = 0; i < 4; ++i) c[i + 4 * (j + 4 * k)] = static_cast<double>(row[i]);
-      }
-    }
-  } else {
-    if (hint.owner == 0) return {outside_, Vec3::Zero()};
-    std::uint32_t cell[3];
-    cell_of(hint, place, cell);
-    cell_samples(cell, 1, c);
-  }
+  if (!nodes_around<1>(p, hint, place, c)) return {outside_, Vec3::Zero()};
   Potential out;
   for (int n = 0; n < 8; ++n) {
     const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
@@ -573,8 +546,7 @@ PointMaterial SparseGrid::material(const Vec3& p, const PointMaterial& own, Spar
       weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
     }
     weights[n] = weight;
-    stored[n] =
-        &brick->material[static_cast<std::size_t>(node[0] + material_side * (node[1] + material_side * node[2]))];
+    stored[n] = &brick->material[material_index(node[0], node[1], node[2])];
   }
   const auto mixed = [&](float PointMaterial::*channel) {
     double sum = 0.0;

@@ -34,6 +34,8 @@ struct PointMaterial {
 inline constexpr std::size_t material_channels = 5;
 /// "stiffness", "damping", "static_friction", "dynamic_friction", "roughness". [any]
 std::span<const char* const> material_channel_names();
+/// Whether a number can be a channel's value: finite, above 0 for a stiffness, 0 or more for the others. [any]
+bool fits_channel(std::size_t channel, float value) noexcept;
 
 /// 8 x 8 x 8 stored points, x fastest: what builds, edits and files deal in.
 struct SparseBlock {
@@ -145,10 +147,9 @@ class SparseGrid {
   };
   /// The brick of the cell that holds p; nullptr where none is stored, then with hint.owner 0 beyond the bricks' box.
   const Brick* locate(const Vec3& p, SparseHint& hint, Place& place) const noexcept;
-  /// Cell of the bricks' box that a place is in.
-  static void cell_of(const SparseHint& hint, const Place& place, std::uint32_t cell[3]) noexcept {
-    for (std::size_t a = 0; a < 3; ++a) cell[a] = brick_cells * hint.at[a] + place.cell[a];
-  }
+  /// The nodes of the cell that holds p and `Ring` more around them, as cell_samples; false beyond the bricks' box.
+  template <int Ring>
+  bool nodes_around(const Vec3& p, SparseHint& hint, Place& place, double* out) const noexcept;
   [[nodiscard]] float constant(std::int32_t entry) const noexcept {
     return static_cast<float>(entry == outside_entry ? outside_ : inside_);
   }

@@ -50,16 +50,16 @@ Status BrickPool::allocate(std::size_t resident_bytes) {
   slot_bytes_ = (brick_bytes(header_.type) + line - 1) / line * line;
   const std::size_t slots = std::min({resident_bytes / slot_bytes_, header_.bricks.size(), std::size_t{doomed - 1}});
   if (slots < header_.levels.back().count()) {
-    return Error{ErrorCode::too_large, "does not fit its coarsest level into the resident memory", file_, "resident",
-                 fmt::format("{} bytes or more", slot_bytes_)};
+    return refused(ErrorCode::too_large, "does not fit its coarsest level into the resident memory", "resident",
+                   fmt::format("{} bytes or more", slot_bytes_))
+        .in_file(file_);
   }
   // Not touched before a brick comes in.
   slots_ = std::make_unique_for_overwrite<std::byte[]>(slots * slot_bytes_);
   words_ = std::make_unique<std::atomic<std::uint32_t>[]>(header_.bricks.size());
   for (std::size_t n = 0; n < header_.bricks.size(); ++n) words_[n].store(absent, std::memory_order_relaxed);
   brick_of_.assign(slots, no_index);
-  free_.resize(slots);
-  for (std::size_t n = 0; n < slots; ++n) free_[n] = static_cast<std::uint32_t>(slots - 1 - n);
+  for (std::size_t n = slots; n-- > 0;) free_.push_back(static_cast<std::uint32_t>(n));
   retiring_.reserve(slots);
   return success();
 }

@@ -39,11 +39,9 @@ std::vector<LooseEnds> loose_ends(const TriangleMesh& mesh, double cell) {
       const Vec3& a = mesh.positions()[runs[i].edge >> 32U];
       const Vec3& b = mesh.positions()[runs[i].edge & 0xFFFFFFFFU];
       const Vec3 middle = 0.5 * (a + b);
-      std::array<std::int32_t, 3> at{};
-      for (int axis = 0; axis < 3; ++axis)
-        at[static_cast<std::size_t>(axis)] =
-            static_cast<std::int32_t>(std::floor((middle[axis] - mesh.bounds().lower[axis]) / cell));
-      LooseEnds& ends = cells[key_of(at)];
+      const Vec3 place = (middle - mesh.bounds().lower) / cell;
+      const auto whole = [&](int axis) { return static_cast<std::int32_t>(std::floor(place[axis])); };
+      LooseEnds& ends = cells[key_of({whole(0), whole(1), whole(2)})];
       if (ends.length == 0.0) ends.centre = middle;
       ends.radius = std::max({ends.radius, (a - ends.centre).norm(), (b - ends.centre).norm()});
       ends.length += std::abs(sum) * (b - a).norm();
@@ -82,25 +80,17 @@ class Signs {
         if (!reachable(node)) settle(node, winding(node));
       }
     });
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-      for (std::uint32_t point = 0; point < SparseBlock::points; ++point) {
-        const Node node{b, point};
-        if (sign(node) == 0) spread(node);
-      }
-    }
+    spread_the_rest();
     apply();
   }
 
   /// Answers whether points are left that no sign reached.
   bool carry_flood() {
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-      for (std::uint32_t point = 0; point < SparseBlock::points; ++point) {
-        const Node node{b, point};
-        if (!(distance(node) >= voxel_)) continue;
-        states_[b].sign[point] = blocks_[b].distance[point] < 0.0F ? -1 : 1;
-        if (distance(node) < 2.5 * voxel_) queue_.emplace_back(node, 0.0);
-      }
-    }
+    for_each_node(blocks_, [&](const Node& node) {
+      if (!(distance(node) >= voxel_)) return;
+      states_[node.block].sign[node.point] = blocks_[node.block].distance[node.point] < 0.0F ? -1 : 1;
+      if (distance(node) < 2.5 * voxel_) queue_.emplace_back(node, 0.0);
+    });
     for (std::size_t i = 0; i < queue_.size(); ++i) {
       const Node node = queue_[i].first;
       for_each_joined(node, [&](const Node& next) {
@@ -116,20 +106,14 @@ class Signs {
   void ask_for_the_rest(const WindingNumber& winding_number) {
     winding_ = &winding_number;
     prepare();
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-      for (std::uint32_t point = 0; point < SparseBlock::points; ++point) {
-        if (sign({b, point}) == 0) spread({b, point});
-      }
-    }
+    spread_the_rest();
   }
   /// Gives the distances the signs that are known.
   void apply() {
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      for (std::size_t point = 0; point < SparseBlock::points; ++point) {
-        float& distance = blocks_[b].distance[point];
-        if (states_[b].sign[point] != 0) distance = std::copysign(distance, states_[b].sign[point] < 0 ? -1.0F : 1.0F);
-      }
-    }
+    for_each_node(blocks_, [&](const Node& node) {
+      float& stored = blocks_[node.block].distance[node.point];
+      if (sign(node) != 0) stored = std::copysign(stored, sign(node) < 0 ? -1.0F : 1.0F);
+    });
   }
 
  private:
@@ -147,6 +131,13 @@ class Signs {
         states_[b].steepest +=
             distance > 0.0 ? loose.length / (4.0 * std::numbers::pi * distance * distance) : infinity;
       }
+    });
+  }
+
+  /// Asks for the winding number where no sign is known yet.
+  void spread_the_rest() {
+    for_each_node(blocks_, [&](const Node& node) {
+      if (sign(node) == 0) spread(node);
     });
   }
 
@@ -233,9 +224,7 @@ std::vector<bool> disagreeing(const TriangleMesh& mesh) {
         if (other == no_index || side_of[other] != 0) continue;
         const std::uint32_t from = triangles[face][static_cast<std::size_t>(e)];
         const std::uint32_t to = triangles[face][static_cast<std::size_t>((e + 1) % 3)];
-        bool same_way = false;
-        for (std::size_t k = 0; k < 3; ++k)
-          same_way = same_way || (triangles[other][k] == from && triangles[other][(k + 1) % 3] == to);
+        const bool same_way = triangles[other][(mesh.corner_of(other, from) + 1) % 3] == to;
         side_of[other] = static_cast<std::int8_t>(same_way ? -side_of[face] : side_of[face]);
         part.push_back(other);
       }

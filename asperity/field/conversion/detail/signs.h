@@ -3,9 +3,7 @@
 
 #include <array>
 #include <memory>
-#include <string>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "asperity/core/parallel_for.h"
@@ -34,6 +32,14 @@ struct Node {
   std::uint32_t point = 0;
 };
 
+/// Calls visit(node) for every stored point of the blocks that there are when it begins. [build]
+template <class Visit>
+void for_each_node(const std::vector<VoxelBlock>& blocks, const Visit& visit) {
+  for (std::uint32_t b = 0, count = static_cast<std::uint32_t>(blocks.size()); b < count; ++b) {
+    for (std::uint32_t n = 0; n < SparseBlock::points; ++n) visit(Node{b, n});
+  }
+}
+
 /// Where the blocks of a list are, and what is beside them.
 class BlockMap {
  public:
@@ -41,8 +47,8 @@ class BlockMap {
   explicit BlockMap(const std::vector<VoxelBlock>& blocks);
   /// Index of the block at this place, or no_index. [build]
   [[nodiscard]] std::uint32_t find(const std::array<std::int32_t, 3>& at) const;
-  /// Takes in a block that was put at the end of the list. [build]
-  void add(const std::array<std::int32_t, 3>& at);
+  /// Puts a block at the end of the list, without faces and this far from them throughout; answers its index. [build]
+  std::uint32_t append(const std::array<std::int32_t, 3>& at, double distance, std::vector<VoxelBlock>& blocks);
   /// The point beside one: `way` 0 to 5 is -x, +x, -y, +y, -z, +z. [build]
   [[nodiscard]] Node beside(const Node& node, std::uint32_t way) const noexcept {
     constexpr std::uint32_t side = SparseBlock::side;

@@ -1,5 +1,7 @@
 #include "asperity/field/mesostructure/detail/formulas.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,25 +9,13 @@
 
 #include "asperity/core/math.h"
 #include "asperity/core/rng.h"
+#include "asperity/field/mesostructure/detail/tiled_noise.h"
 #include "asperity/geometry/index_table.h"
 
 namespace asperity {
 namespace {
 
 using std::numbers::pi;
-
-/// Heights from a formula of texture coordinates (t up), at the texel centres, row 0 on top.
-template <class Formula>
-std::vector<float> tabulate(int size, Formula&& formula) {
-  std::vector<float> heights;
-  heights.reserve(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
-  for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      heights.push_back(static_cast<float>(formula((x + 0.5) / size, (size - y - 0.5) / size)));
-    }
-  }
-  return heights;
-}
 
 /// 1 at 0, falling as a raised cosine to 0 at 1 and beyond; slope 0 at both ends.
 double raised_cosine(double q) {
@@ -41,6 +31,14 @@ double tiled_difference(double from, double to) {
 /// Distance of two points on a tile that repeats.
 double tiled_distance(double s, double t, double to_s, double to_t) {
   return std::hypot(tiled_difference(to_s, s), tiled_difference(to_t, t));
+}
+
+/// Whether a round thing lies clear of all others, or overlaps them by less than a share of their radii.
+template <class Round>
+bool lies_free(const Round& round, const std::vector<Round>& others, double overlap = 0.0) {
+  return std::none_of(others.begin(), others.end(), [&](const Round& other) {
+    return tiled_distance(round.s, round.t, other.s, other.t) < (1.0 - overlap) * (round.radius + other.radius);
+  });
 }
 
 /// A square of texels, on a tile that repeats, that holds the disc around (s, t): `visit(index, s, t)` at their
@@ -68,6 +66,13 @@ bool under_beam(int texel, int size, int count, double width) {
   return half >= size - phase && phase - size < half;
 }
 
+/// Whether as many found a place as were asked for.
+Status all_placed(std::size_t placed, const MesostructureSpec& spec) {
+  if (placed >= static_cast<std::size_t>(spec.number.value_or(0))) return success();
+  return bad_value(fmt::format("only {} of {} find a place", placed, *spec.number), "number",
+                   "fewer, or smaller radii");
+}
+
 // ---- H_3
 
 /// A round feature of H_3, its radii those of the fixed arrangement times `scale`.
@@ -77,7 +82,7 @@ struct Roundel {
   bool ring = false;
   double centre = 0.0;  // +1: a peak in the middle, -1: a hole
   double scale = 1.0;
-  [[nodiscard]] double radius() const { return (ring ? 0.23 : 0.12) * scale; }
+  double radius = 0.0;  // tiles; of the fixed arrangement not asked for
 };
 
 constexpr std::array<Roundel, 4> fixed_roundels{
@@ -105,9 +110,8 @@ std::vector<Roundel> scatter_roundels(int number, std::uint64_t seed) {
       next.scale = scale;
       next.s = rng.uniform();
       next.t = rng.uniform();
-      found = std::none_of(placed.begin(), placed.end(), [&](const Roundel& other) {
-        return tiled_distance(next.s, next.t, other.s, other.t) < next.radius() + other.radius();
-      });
+      next.radius = (next.ring ? 0.23 : 0.12) * scale;
+      found = lies_free(next, placed);
       if (found) placed.push_back(next);
     }
     if (found) continue;
@@ -143,10 +147,7 @@ std::vector<Wart> scatter_warts(const MesostructureSpec& spec) {
       wart.radius = largest * std::pow(smallest / largest, size);
       if (chance > 0.6 - 0.4 * std::cos(2.0 * pi * wart.s)) continue;
     }
-    const bool free = std::none_of(warts.begin(), warts.end(), [&](const Wart& other) {
-      return tiled_distance(wart.s, wart.t, other.s, other.t) < wart.radius + other.radius;
-    });
-    if (free) warts.push_back(wart);
+    if (lies_free(wart, warts)) warts.push_back(wart);
   }
   return warts;
 }
@@ -177,11 +178,7 @@ std::vector<Coin> scatter_coins(const MesostructureSpec& spec) {
   for (int trial = 0; trial < trials_a_coin * *spec.number && coins.size() < number; ++trial) {
     const Coin coin{rng.uniform(), rng.uniform(), rng.uniform(spec.radius->low, spec.radius->high),
                     rng.uniform(0.0, 0.5 * pi)};
-    const bool free = std::none_of(coins.begin(), coins.end(), [&](const Coin& other) {
-      const double apart = tiled_distance(coin.s, coin.t, other.s, other.t);
-      return apart < (1.0 - spec.overlap) * (coin.radius + other.radius);
-    });
-    if (free) coins.push_back(coin);
+    if (lies_free(coin, coins, spec.overlap)) coins.push_back(coin);
   }
   return coins;
 }
@@ -223,10 +220,10 @@ double arc_distance(const Vec2& point, const Vec2& centre, double radius, double
   return std::min((arm - radius * start).norm(), (arm - radius * end).norm());
 }
 
-double letter_distance(double radius, double s, double t) {
+double letter_distance(double radius, const Vec2& st) {
   const double sweep = 250.0 / 180.0 * pi;
-  const double upper = arc_distance({s, t}, {0.5, 0.5 + radius}, radius, 1.5 * pi - sweep, sweep);
-  const double lower = arc_distance({s, t}, {0.5, 0.5 - radius}, radius, 0.5 * pi - sweep, sweep);
+  const double upper = arc_distance(st, {0.5, 0.5 + radius}, radius, 1.5 * pi - sweep, sweep);
+  const double lower = arc_distance(st, {0.5, 0.5 - radius}, radius, 0.5 * pi - sweep, sweep);
   return std::min(upper, lower);
 }
 
@@ -248,8 +245,8 @@ class TiledNoise {
     const int j = static_cast<int>(row) % cells_;
     const int right = (i + 1) % cells_;
     const int above = (j + 1) % cells_;
-    const double u = quintic(offset.x());
-    const double v = quintic(offset.y());
+    const double u = smooth_step(offset.x());
+    const double v = smooth_step(offset.y());
     const double low = std::lerp(slope(i, j, offset), slope(right, j, offset - Vec2(1.0, 0.0)), u);
     const double high =
         std::lerp(slope(i, above, offset - Vec2(0.0, 1.0)), slope(right, above, offset - Vec2(1.0, 1.0)), u);
@@ -257,8 +254,6 @@ class TiledNoise {
   }
 
  private:
-  static double quintic(double t) { return t * t * t * (t * (6.0 * t - 15.0) + 10.0); }
-
   static const std::array<Vec2, 256>& directions() {
     static const std::array<Vec2, 256> table = [] {
       std::array<Vec2, 256> all;
@@ -283,12 +278,12 @@ class TiledNoise {
 
 }  // namespace
 
-std::vector<float> flat_heights(const MesostructureSpec& spec) {
+MadeHeights flat_heights(const MesostructureSpec& spec) {
   return std::vector<float>(static_cast<std::size_t>(spec.size) * static_cast<std::size_t>(spec.size),
                             static_cast<float>(spec.amplitude));
 }
 
-std::vector<float> serrated_heights(const MesostructureSpec& spec) {
+MadeHeights serrated_heights(const MesostructureSpec& spec) {
   const int size = spec.size;
   const double slope = (1.0 - spec.wall) * size;  // the right side's part of a ridge, in units of the phase
   std::vector<float> row;
@@ -305,7 +300,7 @@ std::vector<float> serrated_heights(const MesostructureSpec& spec) {
   return heights;
 }
 
-std::vector<float> beam_heights(const MesostructureSpec& spec) {
+MadeHeights beam_heights(const MesostructureSpec& spec) {
   const auto side = static_cast<std::size_t>(spec.size);
   std::vector<bool> covered;
   for (int i = 0; i < spec.size; ++i) covered.push_back(under_beam(i, spec.size, spec.count, *spec.width));
@@ -318,68 +313,69 @@ std::vector<float> beam_heights(const MesostructureSpec& spec) {
   return heights;
 }
 
-std::vector<float> ring_heights(const MesostructureSpec& spec) {
+MadeHeights ring_heights(const MesostructureSpec& spec) {
   const std::vector<Roundel> roundels = spec.number
                                             ? scatter_roundels(*spec.number, spec.seed)
                                             : std::vector<Roundel>(fixed_roundels.begin(), fixed_roundels.end());
-  return tabulate(spec.size, [&](double s, double t) {
+  return tabulated(spec.size, spec.size, [&](const Vec2& st) {
     double rise = 0.0;
-    for (const Roundel& roundel : roundels) rise += roundel_rise(roundel, s, t);
+    for (const Roundel& roundel : roundels) rise += roundel_rise(roundel, st.x(), st.y());
     return 0.5 * spec.amplitude * (1.0 + rise);
   });
 }
 
-ScatteredHeights wart_heights(const MesostructureSpec& spec) {
+MadeHeights wart_heights(const MesostructureSpec& spec) {
   const std::vector<Wart> warts = scatter_warts(spec);
   const auto texels = static_cast<std::size_t>(spec.size) * static_cast<std::size_t>(spec.size);
-  ScatteredHeights scattered{std::vector<float>(texels), static_cast<int>(warts.size())};
+  ASPERITY_CHECK(all_placed(warts.size(), spec));
+  std::vector<float> heights(texels);
   for (const Wart& wart : warts) {
     for_each_texel_near(spec.size, wart.s, wart.t, wart.radius, [&](std::size_t index, double s, double t) {
       const double rise = wart_profile(wart, spec.radius->high, tiled_distance(s, t, wart.s, wart.t));
-      scattered.heights[index] = std::max(scattered.heights[index], static_cast<float>(spec.amplitude * rise));
+      heights[index] = std::max(heights[index], static_cast<float>(spec.amplitude * rise));
     });
   }
-  return scattered;
+  return heights;
 }
 
-ScatteredHeights coin_heights(const MesostructureSpec& spec) {
+MadeHeights coin_heights(const MesostructureSpec& spec) {
   const std::vector<Coin> coins = scatter_coins(spec);
   const auto texels = static_cast<std::size_t>(spec.size) * static_cast<std::size_t>(spec.size);
-  ScatteredHeights scattered{std::vector<float>(texels), static_cast<int>(coins.size())};
+  ASPERITY_CHECK(all_placed(coins.size(), spec));
+  std::vector<float> heights(texels);
   for (const Coin& coin : coins) {
     for_each_texel_near(spec.size, coin.s, coin.t, coin.radius, [&](std::size_t index, double s, double t) {
       const Vec2 p(tiled_difference(coin.s, s), tiled_difference(coin.t, t));
       const double covers = inside(p.norm() - coin.radius, *spec.flank);
       if (covers <= 0.0) return;
       const double relief = spec.amplitude * coin_relief(spec, coin, p);
-      scattered.heights[index] =
-          static_cast<float>(std::lerp(static_cast<double>(scattered.heights[index]), relief, covers));
+      heights[index] = static_cast<float>(std::lerp(static_cast<double>(heights[index]), relief, covers));
     });
   }
-  return scattered;
+  return heights;
 }
 
-std::vector<float> groove_heights(const MesostructureSpec& spec) {
+MadeHeights groove_heights(const MesostructureSpec& spec) {
   const double half = 0.5 * *spec.width;
   const double wall = *spec.flank / half;
-  return tabulate(spec.size, [&](double s, double t) {
-    const double q = letter_distance(spec.radius->high, s, t) / half;
+  return tabulated(spec.size, spec.size, [&](const Vec2& st) {
+    const double q = letter_distance(spec.radius->high, st) / half;
     const double up_the_wall = q - (1.0 - wall);
     const double depth = up_the_wall < wall ? raised_cosine(up_the_wall / wall) : 0.0;
     return -spec.amplitude * (up_the_wall <= 0.0 ? 1.0 : depth);
   });
 }
 
-std::vector<float> fractal_heights(const MesostructureSpec& spec) {
+MadeHeights fractal_heights(const MesostructureSpec& spec) {
   Rng rng(spec.seed);
   std::vector<TiledNoise> octaves;
   for (int k = 0; k < *spec.octaves; ++k) octaves.emplace_back(2 << k, rng);
   const double share = std::exp2(-spec.hurst);
-  std::vector<float> heights = tabulate(spec.size, [&](double s, double t) {
+  std::vector<float> heights = tabulated(spec.size, spec.size, [&](const Vec2& st) {
     double height = 0.0;
     double weight = 1.0;
     for (const TiledNoise& octave : octaves) {
-      height += weight * octave.at(s, t);
+      height += weight * octave.at(st.x(), st.y());
       weight *= share;
     }
     return height;

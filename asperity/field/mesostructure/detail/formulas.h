@@ -7,18 +7,16 @@
 
 namespace asperity {
 
-std::vector<float> flat_heights(const MesostructureSpec& spec);
-std::vector<float> serrated_heights(const MesostructureSpec& spec);
-std::vector<float> beam_heights(const MesostructureSpec& spec);
-std::vector<float> ring_heights(const MesostructureSpec& spec);
-std::vector<float> groove_heights(const MesostructureSpec& spec);
-std::vector<float> fractal_heights(const MesostructureSpec& spec);
-// These two do not find a place for every number; they answer fewer than asked then.
-struct ScatteredHeights {
-  std::vector<float> heights;
-  int placed = 0;
-};
-ScatteredHeights wart_heights(const MesostructureSpec& spec);
-ScatteredHeights coin_heights(const MesostructureSpec& spec);
+using MadeHeights = Result<std::vector<float>>;
+
+MadeHeights flat_heights(const MesostructureSpec& spec);
+MadeHeights serrated_heights(const MesostructureSpec& spec);
+MadeHeights beam_heights(const MesostructureSpec& spec);
+MadeHeights ring_heights(const MesostructureSpec& spec);
+/// These two do not find a place for every number. Errors: bad_value ("number").
+MadeHeights wart_heights(const MesostructureSpec& spec);
+MadeHeights coin_heights(const MesostructureSpec& spec);
+MadeHeights groove_heights(const MesostructureSpec& spec);
+MadeHeights fractal_heights(const MesostructureSpec& spec);
 
 }  // namespace asperity

@@ -123,6 +123,14 @@ class ScatteredPoints {
     }
   }
 
+  /// The greatest of what height(dx, dy, i, j) answers for the points that near() visits, and 0. [any]
+  template <class Height>
+  [[nodiscard]] double highest(double s, double t, int reach, Height&& height) const {
+    double most = 0.0;
+    near(s, t, reach, [&](double dx, double dy, int i, int j) { most = std::max(most, height(dx, dy, i, j)); });
+    return most;
+  }
+
   /// Distances (cells) to the nearest point and the next one, and the nearest one's cell.
   struct Nearest {
     double first = infinity;
