@@ -59,28 +59,8 @@ Vec3 unit_or_zero(const Vec3& v) noexcept {
   return length > 0.0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 
-}  // namespace
-
-BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face) noexcept {
-  const auto [a, b, c] = mesh.corners(face);
-  return barycentric_frame(a, b, c);
-}
-
-BarycentricFrame barycentric_frame(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
-  const Vec3 cross = (b - a).cross(c - a);
-  const double twice_area = cross.norm();
-  BarycentricFrame frame;
-  frame.normal = cross / twice_area;
-  frame.corner = a;
-  frame.gradient[1] = frame.normal.cross(a - c) / twice_area;
-  frame.gradient[2] = frame.normal.cross(b - a) / twice_area;
-  frame.gradient[0] = -frame.gradient[1] - frame.gradient[2];
-  return frame;
-}
-
-namespace {
-
-Error bad_repeat(const Vec2& repeat) {
+Status check_repeat(const Vec2& repeat) {
+  if (repeat.allFinite() && repeat.minCoeff() > 0.0 && repeat.maxCoeff() <= most_repeats) return success();
   return bad_value(fmt::format("is {} x {}", repeat.x(), repeat.y()), "repeat", "numbers above 0, at most 1e9");
 }
 
@@ -130,11 +110,6 @@ void mark_uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool 
     }
     return true;
   };
-  const auto corner_of = [&](std::uint32_t face, std::uint32_t vertex) {
-    std::size_t k = 0;
-    while (mesh.triangles()[face][k] != vertex) ++k;
-    return k;
-  };
   for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
     const auto here = corner_coordinates(mesh, face, settings);
     for (int edge = 0; edge < 3; ++edge) {
@@ -144,7 +119,7 @@ void mark_uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool 
       Vec2 shift[2];
       for (int end = 0; end < 2; ++end) {
         const auto k = static_cast<std::size_t>((edge + end) % 3);
-        const std::size_t j = corner_of(other, mesh.triangles()[face][k]);
+        const std::size_t j = mesh.corner_of(other, mesh.triangles()[face][k]);
         // An end that does not fit counts as one repeat off.
         shift[end] = same(here[k], there[j]) ? Vec2(here[k] - there[j]) : Vec2(end + 1.0, 0.0);
         if (!same(here[k], there[j])) mark(face, edge);
@@ -155,39 +130,77 @@ void mark_uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool 
   }
 }
 
+void add(HeightJet& sum, const HeightJet& more) noexcept {
+  sum.height += more.height;
+  sum.u += more.u;
+  sum.v += more.v;
+  sum.uu += more.uu;
+  sum.uv += more.uv;
+  sum.vv += more.vv;
+}
+
+/// Second derivative of a map along two steps of its texture coordinates.
+double second_along(const HeightCurvature& map, const Vec2& a, const Vec2& b) noexcept {
+  return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
+}
+
+/// Texture coordinates of a place, or of a step, seen along an axis.
+Vec2 seen_along(int axis, const Vec3& place, const Vec2& tile) noexcept {
+  return {place[(axis + 1) % 3] / tile.x(), place[(axis + 2) % 3] / tile.y()};
+}
+
+Vec3 place_at(const CoatFrame& frame, double u, double v) noexcept {
+  return frame.point + u * frame.point_u + v * frame.point_v;
+}
+
+/// Around the places at three barycentric coordinates.
+Box box_around(const CoatFrame& frame, const Vec2 corners[3]) noexcept {
+  Box box;
+  for (int k = 0; k < 3; ++k) box.include(place_at(frame, corners[k].x(), corners[k].y()));
+  return box;
+}
+
 }  // namespace
+
+BarycentricFrame barycentric_frame(const TriangleMesh& mesh, std::uint32_t face) noexcept {
+  const auto [a, b, c] = mesh.corners(face);
+  return barycentric_frame(a, b, c);
+}
+
+BarycentricFrame barycentric_frame(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
+  const Vec3 cross = (b - a).cross(c - a);
+  const double twice_area = cross.norm();
+  BarycentricFrame frame;
+  frame.normal = cross / twice_area;
+  frame.corner = a;
+  frame.gradient[1] = frame.normal.cross(a - c) / twice_area;
+  frame.gradient[2] = frame.normal.cross(b - a) / twice_area;
+  frame.gradient[0] = -frame.gradient[1] - frame.gradient[2];
+  return frame;
+}
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, std::shared_ptr<const Mesostructure> maps,
                          const CoatSettings& settings) {
-  CoatParts parts;
-  parts.maps.push_back(std::move(maps));
-  return build(mesh, std::move(parts), settings);
+  return build(mesh, CoatParts{{std::move(maps)}, {}, {}, nullptr}, settings);
 }
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, std::vector<std::shared_ptr<const Mesostructure>> maps,
                          std::vector<std::uint8_t> map_of_face, const CoatSettings& settings) {
-  CoatParts parts;
-  parts.maps = std::move(maps);
-  parts.map_of_face = std::move(map_of_face);
-  return build(mesh, std::move(parts), settings);
+  return build(mesh, CoatParts{std::move(maps), std::move(map_of_face), {}, nullptr}, settings);
 }
 
 Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSettings& settings) {
-  auto& maps = parts.maps;
-  auto& map_of_face = parts.map_of_face;
-  if (!settings.repeat.allFinite() || settings.repeat.minCoeff() <= 0.0 || settings.repeat.maxCoeff() > most_repeats)
-    return bad_repeat(settings.repeat);
+  auto& [maps, map_of_face, layers, materials] = parts;
+  ASPERITY_CHECK(check_repeat(settings.repeat));
   if (auto valid = validate(settings.stitching); !valid) return std::move(valid).error().at("stitching");
   if (settings.mapping == Mapping::uv && !mesh.has_uvs())
     return bad_mapping("is \"uv\", but the mesh has no texture coordinates");
   const auto most = map_of_face.empty() ? std::uint8_t{0} : *std::max_element(map_of_face.begin(), map_of_face.end());
   if (maps.empty() || most >= maps.size() || (!map_of_face.empty() && map_of_face.size() != mesh.triangles().size())) {
-    return Error{
+    return refused(
         ErrorCode::mismatch,
         fmt::format("{} maps, {} faces named, {} triangles", maps.size(), map_of_face.size(), mesh.triangles().size()),
-        {},
-        "map_of_face",
-        "one number of a map for every triangle"};
+        "map_of_face", "one number of a map for every triangle");
   }
   Coat coat;
   coat.mesh_ = mesh.fingerprint();
@@ -202,8 +215,8 @@ Result<Coat> Coat::build(const TriangleMesh& mesh, CoatParts parts, const CoatSe
   }
   coat.maps_ = std::move(maps);
   coat.map_of_face_ = std::move(map_of_face);
-  coat.materials_ = std::move(parts.materials);
-  ASPERITY_CHECK(coat.take_layers(std::move(parts.layers)));
+  coat.materials_ = std::move(materials);
+  ASPERITY_CHECK(coat.take_layers(std::move(layers)));
   coat.texel_size_ = coat.finest_grain(mesh);
   if (coat.texel_size_ == 0.0)
     return bad_mapping("is \"uv\", but the texture coordinates span no area on any face looked at");
@@ -231,8 +244,7 @@ Status Coat::take_layers(std::vector<CoatLayer> layers) {
     const std::string place = fmt::format("layers[{}]", i);
     if ((layer.maps == nullptr) == (layer.solid == nullptr))
       return refused(ErrorCode::mismatch, "names neither or both of a map and a solid", place, "one of them");
-    if (!layer.repeat.allFinite() || layer.repeat.minCoeff() <= 0.0 || layer.repeat.maxCoeff() > most_repeats)
-      return bad_repeat(layer.repeat).at(place);
+    if (Status fits = check_repeat(layer.repeat); !fits) return std::move(fits).error().at(place);
     if (layer.solid != nullptr) {
       places_ = true;
       moves_ = moves_ || layer.solid->moves();
@@ -355,7 +367,7 @@ HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
   for (const CoatLayer& layer : frame.layers) {
     HeightJet more;
     if (layer.solid != nullptr) {
-      const SolidJet solid = layer.solid->jet(frame.point + u * frame.point_u + v * frame.point_v, frame.moment.time);
+      const SolidJet solid = layer.solid->jet(place_at(frame, u, v), frame.moment.time);
       const Vec3 along_u = solid.second * frame.point_u;
       const Vec3 along_v = solid.second * frame.point_v;
       more = {solid.height,
@@ -367,12 +379,7 @@ HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
     } else {
       more = own_jet(layer_frame(frame, layer), u, v);
     }
-    sum.height += more.height;
-    sum.u += more.u;
-    sum.v += more.v;
-    sum.uu += more.uu;
-    sum.uv += more.uv;
-    sum.vv += more.vv;
+    add(sum, more);
   }
   return sum;
 }
@@ -380,19 +387,16 @@ HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
   if (frame.triplanar) return triplanar_jet(frame, u, v);
   const HeightCurvature map = frame.maps->curvature(frame.st + u * frame.st_u + v * frame.st_v, frame.level);
-  const auto second = [&](const Vec2& a, const Vec2& b) {
-    return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
-  };
   return {map.height,
           map.gradient.dot(frame.st_u),
           map.gradient.dot(frame.st_v),
-          second(frame.st_u, frame.st_u),
-          second(frame.st_u, frame.st_v),
-          second(frame.st_v, frame.st_v)};
+          second_along(map, frame.st_u, frame.st_u),
+          second_along(map, frame.st_u, frame.st_v),
+          second_along(map, frame.st_v, frame.st_v)};
 }
 
 HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept {
-  const Vec3 point = frame.point + u * frame.point_u + v * frame.point_v;
+  const Vec3 point = place_at(frame, u, v);
   const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
   const Vec2& tile = frame.maps->tile();
   HeightJet sum;     // of w H
@@ -418,28 +422,18 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
                         2.0 * (q_u * q_u + q * q_uu),
                         2.0 * (q_u * q_v + q * q_uv),
                         2.0 * (q_v * q_v + q * q_vv)};
-    const int s = (axis + 1) % 3;
-    const int t = (axis + 2) % 3;
-    const HeightCurvature map = frame.maps->curvature(Vec2(point[s] / tile.x(), point[t] / tile.y()), frame.level);
-    const Vec2 st_u(frame.point_u[s] / tile.x(), frame.point_u[t] / tile.y());
-    const Vec2 st_v(frame.point_v[s] / tile.x(), frame.point_v[t] / tile.y());
+    const HeightCurvature map = frame.maps->curvature(seen_along(axis, point, tile), frame.level);
+    const Vec2 st_u = seen_along(axis, frame.point_u, tile);
+    const Vec2 st_v = seen_along(axis, frame.point_v, tile);
     const double hu = map.gradient.dot(st_u);
     const double hv = map.gradient.dot(st_v);
-    const auto second = [&](const Vec2& a, const Vec2& b) {
-      return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
-    };
     sum.height += w * map.height;
     sum.u += own.u * map.height + w * hu;
     sum.v += own.v * map.height + w * hv;
-    sum.uu += own.uu * map.height + 2.0 * own.u * hu + w * second(st_u, st_u);
-    sum.uv += own.uv * map.height + own.u * hv + own.v * hu + w * second(st_u, st_v);
-    sum.vv += own.vv * map.height + 2.0 * own.v * hv + w * second(st_v, st_v);
-    weight.height += own.height;
-    weight.u += own.u;
-    weight.v += own.v;
-    weight.uu += own.uu;
-    weight.uv += own.uv;
-    weight.vv += own.vv;
+    sum.uu += own.uu * map.height + 2.0 * own.u * hu + w * second_along(map, st_u, st_u);
+    sum.uv += own.uv * map.height + own.u * hv + own.v * hu + w * second_along(map, st_u, st_v);
+    sum.vv += own.vv * map.height + 2.0 * own.v * hv + w * second_along(map, st_v, st_v);
+    add(weight, own);
   }
   const double per = 1.0 / std::max(weight.height, std::numeric_limits<double>::min());
   HeightJet jet;
@@ -457,10 +451,8 @@ HeightRange Coat::range(const CoatFrame& frame, const Vec2 corners[3]) const noe
   for (const CoatLayer& layer : frame.layers) {
     HeightRange more;
     if (layer.solid != nullptr) {
-      Box box;
-      for (int k = 0; k < 3; ++k)
-        box.include(Vec3(frame.point + corners[k].x() * frame.point_u + corners[k].y() * frame.point_v));
-      more = layer.solid->range(0.5 * (box.lower + box.upper), 0.5 * box.extent(), frame.moment.time);
+      const Box box = box_around(frame, corners);
+      more = layer.solid->range(box.centre(), 0.5 * box.extent(), frame.moment.time);
     } else {
       more = own_range(layer_frame(frame, layer), corners);
     }
@@ -482,20 +474,12 @@ HeightRange Coat::own_range(const CoatFrame& frame, const Vec2 corners[3]) const
     return frame.maps->range_over(lower, upper, frame.level);
   }
   // A weighted mean of three heights lies between their bounds.
-  Vec3 lower = Vec3::Constant(infinity);
-  Vec3 upper = Vec3::Constant(-infinity);
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 point = frame.point + corners[k].x() * frame.point_u + corners[k].y() * frame.point_v;
-    lower = lower.cwiseMin(point);
-    upper = upper.cwiseMax(point);
-  }
+  const Box box = box_around(frame, corners);
   const Vec2& tile = frame.maps->tile();
   HeightRange all{infinity, -infinity};
   for (int axis = 0; axis < 3; ++axis) {
-    const int s = (axis + 1) % 3;
-    const int t = (axis + 2) % 3;
-    const HeightRange one = frame.maps->range_over(Vec2(lower[s] / tile.x(), lower[t] / tile.y()),
-                                                   Vec2(upper[s] / tile.x(), upper[t] / tile.y()), frame.level);
+    const HeightRange one =
+        frame.maps->range_over(seen_along(axis, box.lower, tile), seen_along(axis, box.upper, tile), frame.level);
     all.lowest = std::min(all.lowest, one.lowest);
     all.highest = std::max(all.highest, one.highest);
   }
@@ -545,7 +529,7 @@ LocalMaterial Coat::material(const CoatFrame& frame, double u, double v) const n
   };
   if (!frame.triplanar)
     return turned(materials_->sample(frame.st + u * frame.st_u + v * frame.st_v), frame.st_u, frame.st_v);
-  const Vec3 point = frame.point + u * frame.point_u + v * frame.point_v;
+  const Vec3 point = place_at(frame, u, v);
   const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
   const Vec2& tile = frame.maps->tile();
   LocalMaterial sum;
@@ -560,11 +544,8 @@ LocalMaterial Coat::material(const CoatFrame& frame, double u, double v) const n
                        2.0 * (normal[axis] * frame.normal_v[axis] - triplanar_threshold * normal.dot(frame.normal_v)));
     const double w = q * q;
     const Vec2 w_slope = 2.0 * q * q_slope;
-    const int s = (axis + 1) % 3;
-    const int t = (axis + 2) % 3;
-    const Vec2 st_u(frame.point_u[s] / tile.x(), frame.point_u[t] / tile.y());
-    const Vec2 st_v(frame.point_v[s] / tile.x(), frame.point_v[t] / tile.y());
-    const LocalMaterial one = turned(materials_->sample(Vec2(point[s] / tile.x(), point[t] / tile.y())), st_u, st_v);
+    const LocalMaterial one = turned(materials_->sample(seen_along(axis, point, tile)),
+                                     seen_along(axis, frame.point_u, tile), seen_along(axis, frame.point_v, tile));
     for (std::size_t c = 0; c < mapped_channels; ++c) {
       sum.value[c] += w * one.value[c];
       sum.slope[c] += w * one.slope[c];
@@ -640,7 +621,7 @@ CoatSample Coat::sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
     const int s = (axis + 1) % 3;
     const int t = (axis + 2) % 3;
     const Vec2 tile = own.tile();
-    const MesostructureSample maps = own.sample(Vec2(point[s] / tile.x(), point[t] / tile.y()));
+    const MesostructureSample maps = own.sample(seen_along(axis, point, tile));
     Vec3 slope = Vec3::Zero();
     slope[s] = maps.gradient.x() / tile.x();
     slope[t] = maps.gradient.y() / tile.y();

@@ -45,8 +45,8 @@ Status check_frame(const FeatureMappingSettings& settings) {
   return success();
 }
 
-double distance_to_whole(double number) {
-  return std::abs(number - std::round(number));
+bool is_round(IntermediateSurface surface) {
+  return surface == IntermediateSurface::cylinder || surface == IntermediateSurface::sphere;
 }
 
 /// Lengths near by of which a whole number fits `around`, "1.2 mm or 1.3 mm".
@@ -76,14 +76,9 @@ Result<FeatureMapping> FeatureMapping::build(const FeatureMappingSettings& setti
   }
   ASPERITY_CHECK(check_frame(settings));
   mapping.second_ = settings.axis.cross(settings.reference);
-  switch (settings.surface) {
-    case IntermediateSurface::cylinder:
-    case IntermediateSurface::sphere: ASPERITY_CHECK(check_mapping_length(settings.radius, "radius")); break;
-    case IntermediateSurface::box:
-      for (int k = 0; k < 3; ++k) ASPERITY_CHECK(check_mapping_length(settings.half_extent[k], "half_extent"));
-      break;
-    case IntermediateSurface::plane:
-    case IntermediateSurface::uv: break;
+  if (is_round(settings.surface)) ASPERITY_CHECK(check_mapping_length(settings.radius, "radius"));
+  if (settings.surface == IntermediateSurface::box) {
+    for (int k = 0; k < 3; ++k) ASPERITY_CHECK(check_mapping_length(settings.half_extent[k], "half_extent"));
   }
   return mapping;
 }
@@ -174,9 +169,7 @@ MappedPlace FeatureMapping::on_mesh(const TriangleMesh& mesh, std::uint32_t face
 }
 
 double FeatureMapping::circumference() const noexcept {
-  const bool round =
-      settings_.surface == IntermediateSurface::cylinder || settings_.surface == IntermediateSurface::sphere;
-  return round ? 2.0 * pi * settings_.radius : 0.0;
+  return is_round(settings_.surface) ? 2.0 * pi * settings_.radius : 0.0;
 }
 
 Status FeatureMapping::check(const SurfaceFeature& feature) const {
@@ -186,22 +179,18 @@ Status FeatureMapping::check(const SurfaceFeature& feature) const {
   // Of the way once around, along u' and v' of the feature.
   const double along_u = around * std::abs(std::cos(spec.direction));
   const double along_v = around * std::abs(std::sin(spec.direction));
-  const auto misses = [](double turns) { return distance_to_whole(turns) > seam_tolerance; };
+  const double turns_u = along_u / spec.wavelength.x();
+  const double turns_v = along_v / spec.wavelength.y();
+  const auto misses = [](double turns) { return std::abs(turns - std::round(turns)) > seam_tolerance; };
   switch (spec.kind) {
     case FeatureKind::grating:
     case FeatureKind::triangular:
-    case FeatureKind::serrated: {
-      const double turns = along_u / spec.wavelength.x();
-      if (misses(turns))
-        return no_fit(turns, "wavelengths", "wavelength", fitting(along_u, spec.wavelength.x()) + " for this radius");
-      return success();
-    }
+    case FeatureKind::serrated:
+      if (!misses(turns_u)) return success();
+      return no_fit(turns_u, "wavelengths", "wavelength", fitting(along_u, spec.wavelength.x()) + " for this radius");
     case FeatureKind::grid: {
-      const double turns_u = along_u / spec.wavelength.x();
-      const double turns_v = along_v / spec.wavelength.y();
       // Half a wavelength along both is the same grid again.
-      const bool halves = !misses(turns_u + turns_v) && !misses(turns_u - turns_v);
-      if (halves) return success();
+      if (!misses(turns_u + turns_v) && !misses(turns_u - turns_v)) return success();
       const bool first = misses(turns_u);
       return no_fit(first ? turns_u : turns_v, "wavelengths", "wavelength",
                     fmt::format("{} along {} of the grid's axes for this radius",
@@ -215,9 +204,7 @@ Status FeatureMapping::check(const SurfaceFeature& feature) const {
                       fitting(around, spec.period.x()) + " along u for this radius");
       return success();
     }
-    case FeatureKind::map: {
-      const double turns_u = along_u / spec.wavelength.x();
-      const double turns_v = along_v / spec.wavelength.y();
+    case FeatureKind::map:
       if (spec.heights->wrap() != Wrap::repeat)
         return no_fit(turns_u, "maps that do not repeat", "heights", "a map that repeats");
       if (misses(turns_u))
@@ -226,7 +213,6 @@ Status FeatureMapping::check(const SurfaceFeature& feature) const {
         return no_fit(turns_v, "maps", "wavelength",
                       fitting(along_v, spec.wavelength.y()) + " as its second number for this radius");
       return success();
-    }
     case FeatureKind::circular_grating: break;
   }
   return refused(ErrorCode::mismatch, "circles do not close around a cylinder or a sphere", "kind",

@@ -24,8 +24,7 @@ void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const s
   around.clear();
   for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
     const TriangleMesh::Triangle& corners = mesh.triangles()[face];
-    std::size_t k = 0;
-    while (corners[k] != vertex) ++k;
+    const std::size_t k = mesh.corner_of(face, vertex);
     const Vec3& here = mesh.positions()[vertex];
     const Vec3 one = mesh.positions()[corners[(k + 1) % 3]] - here;
     const Vec3 other = mesh.positions()[corners[(k + 2) % 3]] - here;
@@ -88,20 +87,28 @@ Vec3 most_seen(const std::vector<WeightedNormal>& around, const Vec3& start) {
   return best;
 }
 
+/// Real roots of a h^2 + b h + c other than infinite ones, by the form that does not cancel; answers how many.
+int quadratic_roots(double a, double b, double c, double roots[2]) noexcept {
+  const double discriminant = b * b - 4.0 * a * c;
+  if (discriminant < 0.0) return 0;
+  const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
+  int count = 0;
+  if (a != 0.0) roots[count++] = q / a;
+  if (q != 0.0) roots[count++] = c / q;
+  return count;
+}
+
 /// Interval around 0 on which c0 + c1 h + c2 h^2 stays above `share` of c0 (> 0), cut into `interval`.
 void cut_by_quadratic(double c0, double c1, double c2, ShellInterval& interval) {
   // What is left of the volume where the shell is squeezed most; the rest is margin against its folding over.
   constexpr double share = 0.05;
   const double c = (1.0 - share) * c0;
-  const double discriminant = c1 * c1 - 4.0 * c2 * c;
   double roots[2] = {infinity, infinity};
   if (std::abs(c2) * interval.upper * interval.upper <= 1e-14 * c0 &&
       std::abs(c2) * interval.lower * interval.lower <= 1e-14 * c0) {
     if (c1 != 0.0) roots[0] = -c / c1;
-  } else if (discriminant >= 0.0) {
-    const double q = -0.5 * (c1 + std::copysign(std::sqrt(discriminant), c1));
-    if (c2 != 0.0) roots[0] = q / c2;
-    if (q != 0.0) roots[1] = c / q;
+  } else {
+    quadratic_roots(c2, c1, c, roots);
   }
   for (const double root : roots) {
     if (root > 0.0) interval.upper = std::min(interval.upper, root);
@@ -118,13 +125,7 @@ int cubic_roots(double a, double b, double c, double d, double roots[3]) noexcep
       roots[0] = -d / c;
       return 1;
     }
-    const double discriminant = c * c - 4.0 * b * d;
-    if (discriminant < 0.0) return 0;
-    const double q = -0.5 * (c + std::copysign(std::sqrt(discriminant), c));
-    roots[0] = q / b;
-    if (q == 0.0) return 1;
-    roots[1] = d / q;
-    return 2;
+    return quadratic_roots(b, c, d, roots);
   }
   const double p = b / (3.0 * a);
   const double q = (c / a - 3.0 * p * p) / 3.0;

@@ -92,8 +92,7 @@ Status validate(const Stitching& stitching) {
   }
   for (const double weight : stitching.blend_map) {
     if (!(weight >= 0.0 && weight <= 1.0)) {
-      return Error{
-          ErrorCode::bad_value, fmt::format("holds the weight {:g}", weight), {}, "blend_map", "weights from 0 to 1"};
+      return bad_value(fmt::format("holds the weight {:g}", weight), "blend_map", "weights from 0 to 1");
     }
   }
   if (stitching.blend_map.back() <= 0.0) {
@@ -127,16 +126,12 @@ std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shel
   std::vector<std::array<double, 3>> widths(faces);
   for (std::uint32_t face = 0; face < faces; ++face) {
     for (int k = 0; k < 3; ++k) {
-      const auto corner = static_cast<std::size_t>(k);
-      double least = shapes[face].height[corner];
+      double least = shapes[face].height[k];
       const std::uint32_t other = mesh.neighbour(face, edge_opposite(k));
-      if (other != no_index) {
-        for (int j = 0; j < 3; ++j) {
-          if (mesh.neighbour(other, edge_opposite(j)) == face)
-            least = std::min(least, shapes[other].height[static_cast<std::size_t>(j)]);
-        }
+      for (int j = 0; other != no_index && j < 3; ++j) {
+        if (mesh.neighbour(other, edge_opposite(j)) == face) least = std::min(least, shapes[other].height[j]);
       }
-      widths[face][corner] = rho * least;
+      widths[face][static_cast<std::size_t>(k)] = rho * least;
     }
   }
   // The say of the faces around a vertex must end well before the opposite edges.

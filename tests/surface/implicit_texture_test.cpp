@@ -362,10 +362,9 @@ TEST(Textured, RefusesHeightsThatAreNotFinite) {
 
 TEST(Textured, ModesAreNamed) {
   for (const Redistancing mode : {Redistancing::none, Redistancing::normalised, Redistancing::redistanced})
-    EXPECT_EQ(parse_redistancing(to_string(mode)).value(), mode);
-  const auto unknown = parse_redistancing("fast");
-  ASSERT_FALSE(unknown.ok());
-  EXPECT_NE(unknown.error().message().find("redistanced"), std::string::npos);
+    EXPECT_EQ(value_named<Redistancing>(to_string(mode)), mode);
+  EXPECT_FALSE(value_named<Redistancing>("fast").has_value());
+  EXPECT_NE(name_list<Redistancing>().find("redistanced"), std::string::npos);
 }
 
 // --- K-8: what is felt of a wave ---

@@ -33,6 +33,16 @@ std::string at(const Vec3& p) {
   return fmt::format("({:.4g}, {:.4g}, {:.4g}) m", p.x(), p.y(), p.z());
 }
 
+struct Registered {
+  std::vector<std::string> names;
+  std::vector<CustomSurfaceFactory> factories;
+};
+
+Registered& registry() {
+  static Registered all;
+  return all;
+}
+
 }  // namespace
 
 Result<CustomSurface> CustomSurface::build(std::shared_ptr<const void> field, std::size_t bytes,
@@ -84,15 +94,15 @@ Status CustomSurface::measure() const {
     const double rounding = 1e-12 * (std::abs(here.value) + lipschitz * box.diagonal()) / apart;
     const double steepest =
         std::max(std::abs(slope) - rounding, here.gradient.allFinite() ? here.gradient.norm() : 0.0);
-    if (steepest > lipschitz * counted)
-      return bad_value(
-          fmt::format("is {:.6g}, and at {} the value changes by {:.6g} a metre", lipschitz, at(p), steepest),
-          "lipschitz", "the largest change of the value by metre: searches would pass through the surface");
-    if (i > 0 && std::abs(here.value - value_before) > lipschitz * counted * (p - before).norm())
-      return bad_value(fmt::format("is {:.6g}, and between {} and {} the value changes by {:.6g} a metre", lipschitz,
-                                   at(before), at(p), std::abs(here.value - value_before) / (p - before).norm()),
+    const auto too_steep = [&](const std::string& where, double change) {
+      return bad_value(fmt::format("is {:.6g}, and {} the value changes by {:.6g} a metre", lipschitz, where, change),
                        "lipschitz",
                        "the largest change of the value by metre: searches would pass through the surface");
+    };
+    if (steepest > lipschitz * counted) return too_steep("at " + at(p), steepest);
+    if (i > 0 && std::abs(here.value - value_before) > lipschitz * counted * (p - before).norm())
+      return too_steep(fmt::format("between {} and {}", at(before), at(p)),
+                       std::abs(here.value - value_before) / (p - before).norm());
     constexpr double share = 0.02;
     if (!(std::abs(here.gradient.dot(direction) - slope) <= share * lipschitz + rounding)) {
       ++bad_gradients;
@@ -139,28 +149,13 @@ bool CustomSurface::land(Vec3& q) const noexcept {
   return false;
 }
 
-namespace {
-
-struct Registered {
-  std::vector<std::string> names;
-  std::vector<CustomSurfaceFactory> factories;
-};
-
-Registered& registry() {
-  static Registered all;
-  return all;
-}
-
-}  // namespace
-
 Status register_custom_surface(std::string name, CustomSurfaceFactory factory) {
   Registered& all = registry();
   if (!is_plain_name(name))
     return bad_value(fmt::format("\"{}\" is no name of a surface", name), "name",
                      "lower-case letters, digits and hyphens");
   if (std::find(all.names.begin(), all.names.end(), name) != all.names.end())
-    return Error{
-        ErrorCode::bad_value, fmt::format("a surface \"{}\" is registered already", name), {}, "name", "another name"};
+    return bad_value(fmt::format("a surface \"{}\" is registered already", name), "name", "another name");
   if (!factory)
     return bad_value(fmt::format("the surface \"{}\" has no factory", name), "factory", "a function that makes it");
   all.names.push_back(std::move(name));
@@ -172,20 +167,15 @@ Result<CustomSurface> make_custom_surface(std::string_view name, NamedNumbers& n
   const Registered& all = registry();
   const auto found = std::find(all.names.begin(), all.names.end(), name);
   if (found == all.names.end()) {
-    std::string list;
-    for (const std::string& known : all.names) list += (list.empty() ? "" : ", ") + known;
     const std::string near = nearest_name(name, all.names);
     return bad_value(fmt::format("\"{}\" is no surface that this program knows{}", name,
                                  near.empty() ? std::string() : fmt::format("; did you mean \"{}\"?", near)),
-                     "type", list.empty() ? std::string("a program that registers it (docs/methods/custom.md)") : list);
+                     "type",
+                     all.names.empty() ? "a program that registers it (docs/methods/custom.md)" : listed(all.names));
   }
   ASPERITY_TRY(CustomSurface surface, all.factories[static_cast<std::size_t>(found - all.names.begin())](numbers));
   ASPERITY_CHECK(numbers.all_taken());
   return surface;
-}
-
-const std::vector<std::string>& custom_surface_names() {
-  return registry().names;
 }
 
 }  // namespace asperity

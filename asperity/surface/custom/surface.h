@@ -150,7 +150,5 @@ Status register_custom_surface(const std::string& name) {
 /// A surface of a registered type; `numbers` then tells what was read. Errors: bad_value (unknown type, listing the
 /// known ones), bad_key (a number that the type does not read), and the factory's own. [build]
 Result<CustomSurface> make_custom_surface(std::string_view name, NamedNumbers& numbers);
-/// Every registered type. [any]
-const std::vector<std::string>& custom_surface_names();
 
 }  // namespace asperity

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/geometry/clip.h"
 #include "asperity/surface/walk.h"
 
 namespace asperity {
@@ -11,20 +12,6 @@ namespace {
 
 constexpr int most_trace_steps = 512;  // of one motion
 constexpr double touch_share = 0.5;    // of a skin: nearer than this is touched
-
-/// Cuts the part of a ray, by its length, that lies in a box.
-void clip_ray(const Box& box, const Vec3& from, const Vec3& direction, double& begin, double& end) noexcept {
-  for (int k = 0; k < 3; ++k) {
-    if (direction[k] == 0.0) {
-      if (from[k] < box.lower[k] || from[k] > box.upper[k]) end = -infinity;
-      continue;
-    }
-    const double a = (box.lower[k] - from[k]) / direction[k];
-    const double b = (box.upper[k] - from[k]) / direction[k];
-    begin = std::max(begin, std::min(a, b));
-    end = std::min(end, std::max(a, b));
-  }
-}
 
 /// The tangent plane of a field's surface as it is walked along.
 class FieldChart {
@@ -239,25 +226,19 @@ SweptHit CustomView::trace(const Segment& motion, Sides sides) const noexcept {
   const Vec3 direction = way / length;
   double t = 0.0;
   double end = length;
-  clip_ray(facts.bounds.grown(0.01 * facts.bounds.diagonal()), motion.from, direction, t, end);
-  if (!(t <= end)) return hit;
+  if (!clip_line(facts.bounds.grown(0.01 * facts.bounds.diagonal()), motion.from, direction, t, end)) return hit;
   const double touched = touch_share * skin * facts.lipschitz;
   FieldSample here = surface_->eval(motion.from + t * direction);
   double side = here.value < 0.0 ? -1.0 : 1.0;
   // From within a solid nothing is touched until the way has come out of it.
   bool counts = sides == Sides::both || side > 0.0;
   const auto touch = [&](double distance) {
-    hit.hit = true;
-    hit.t = std::min(1.0, distance / length);
     const Vec3 place = motion.from + distance * direction;
     Vec3 q = place;
     if (!surface_->land(q) || (q - place).norm() > 0.01 * facts.grain) q = place;
     const CustomSpot there = on_side(q, side);
-    hit.side = side;
-    hit.contact.point = hit.contact.at = there.point;
-    hit.contact.normal = side * there.front;
+    hit = point_touch(std::min(1.0, distance / length), side, there.point, there.front, there.element, there.point);
     hit.contact.distance = (place - q).norm();
-    hit.contact.element = there.element;
     return hit;
   };
   for (int step = 0; step < most_trace_steps; ++step) {

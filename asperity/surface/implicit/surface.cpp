@@ -2,43 +2,36 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "asperity/core/units.h"
 
 namespace asperity {
 
 Result<ImplicitSurface> ImplicitSurface::build(ImplicitParts parts) {
-  const auto bad = [](const char* place, std::string what, std::string accepted) {
-    return bad_value(std::move(what), place, std::move(accepted));
-  };
-  if (parts.grid == nullptr) return bad("implicit", "holds no potential", "a sparse grid");
+  if (parts.grid == nullptr) return bad_value("holds no potential", "implicit", "a sparse grid");
   const SparseGrid& grid = *parts.grid;
   const double most = grid.outside() - 2.0 * grid.voxel();
   if (!(parts.offset >= 0.0 && parts.offset <= most)) {
-    return bad("offset",
-               fmt::format("is {}, and the potential is stored up to {} outside", format_length(parts.offset),
-                           format_length(grid.outside())),
-               fmt::format("0 to {}, or a wider band_outside", format_length(most)));
+    return bad_value(fmt::format("is {}, and the potential is stored up to {} outside", format_length(parts.offset),
+                                 format_length(grid.outside())),
+                     "offset", fmt::format("0 to {}, or a wider band_outside", format_length(most)));
   }
   if (parts.mesh != nullptr && grid.has_faces()) {
     const std::size_t faces = parts.mesh->mesh().triangles().size();
     const SparseSource source = grid.source();
-    for (std::size_t b = 0; b < source.blocks.size(); ++b) {
-      for (const std::uint32_t face : source.blocks[b].face) {
+    for (const SparseBlock& block : source.blocks) {
+      for (const std::uint32_t face : block.face) {
         if (face == no_index || face < faces) continue;
-        return bad("implicit", fmt::format("names face {} as the closest, and the mesh has {}", face, faces),
-                   "the mesh that the potential was made from");
+        return bad_value(fmt::format("names face {} as the closest, and the mesh has {}", face, faces), "implicit",
+                         "the mesh that the potential was made from");
       }
     }
   }
   auto field = std::make_shared<const ScalarField>(parts.grid, parts.reconstruction);
   Result<IsoSurface> iso = IsoSurface::build(std::move(field), parts.offset, Inside::low);
   if (!iso) {
-    return bad("implicit",
-               fmt::format("has no surface: the potential ranges from {} to {}", format_length(grid.lowest()),
-                           format_length(grid.highest())),
-               "a potential that is 0 somewhere, positive outside");
+    return bad_value(fmt::format("has no surface: the potential ranges from {} to {}", format_length(grid.lowest()),
+                                 format_length(grid.highest())),
+                     "implicit", "a potential that is 0 somewhere, positive outside");
   }
   return ImplicitSurface(std::move(parts), std::move(iso).value());
 }

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <vector>
 
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/rng.h"
+#include "asperity/field/volume/places.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/surface/iso/surface.h"
 #include "asperity/surface/walk.h"
@@ -129,20 +129,21 @@ void pad(const std::array<std::int32_t, 27>& around, Padded<T>& out, const Store
     if (around[static_cast<std::size_t>(n)] < 0) missing[static_cast<std::size_t>(n)] = beyond(n);
   }
   std::size_t to = 0;
-  for (int k = -1; k <= side; ++k) {
+  for_each_in_cube(-1, side + 1, [&](int i, int j, int k) {
+    const int x = (i + side) / side;
+    const int y = (j + side) / side;
     const int z = (k + side) / side;
-    for (int j = -1; j <= side; ++j) {
-      const int y = (j + side) / side;
-      for (int i = -1; i <= side; ++i) {
-        const int x = (i + side) / side;
-        const auto n = static_cast<std::size_t>(x + 3 * (y + 3 * z));
-        out[to++] = around[n] < 0
-                        ? missing[n]
-                        : stored(static_cast<std::size_t>(around[n]),
-                                 SparseBlock::index(i - (x - 1) * side, j - (y - 1) * side, k - (z - 1) * side));
-      }
-    }
-  }
+    const auto n = static_cast<std::size_t>(x + 3 * (y + 3 * z));
+    out[to++] = around[n] < 0 ? missing[n]
+                              : stored(static_cast<std::size_t>(around[n]),
+                                       SparseBlock::index(i - (x - 1) * side, j - (y - 1) * side, k - (z - 1) * side));
+  });
+}
+
+/// Place of a point in its block.
+std::array<int, 3> place_in_block(std::size_t point) noexcept {
+  const auto n = static_cast<int>(point);
+  return {n % side, n / side % side, n / side / side};
 }
 
 Vec3 node_position(const SparseSource& source, const SparseBlock& block, std::size_t point) noexcept {
@@ -169,20 +170,22 @@ bool within_band(const SparseSource& source, float value) noexcept {
 }
 
 struct AppliedHeights {
-  double lowest = 0.0;  ///< at points within a voxel of the surface
-  double highest = 0.0;
+  double lowest = infinity;  ///< at points within a voxel of the surface
+  double highest = -infinity;
   double up = 0.0;  ///< the largest anywhere in the band, outwards and inwards
   double down = 0.0;
   [[nodiscard]] double largest() const noexcept { return std::max(up, down); }
+  void include(const AppliedHeights& other) noexcept {
+    lowest = std::min(lowest, other.lowest);
+    highest = std::max(highest, other.highest);
+    up = std::max(up, other.up);
+    down = std::max(down, other.down);
+  }
 };
 
 Result<AppliedHeights> apply(const SparseSource& before, const PointHeight& height, SparseSource& after,
                              const Progress& progress) {
-  struct PerBlock {
-    double lowest = infinity;
-    double highest = -infinity;
-    double up = 0.0;
-    double down = 0.0;
+  struct PerBlock : AppliedHeights {
     std::size_t bad = SparseBlock::points;
     double bad_height = 0.0;
   };
@@ -203,16 +206,12 @@ Result<AppliedHeights> apply(const SparseSource& before, const PointHeight& heig
         return;
       }
       const double value = static_cast<double>(block.value[point]);
-      here.up = std::max(here.up, h);
-      here.down = std::max(here.down, -h);
-      if (std::abs(value) <= before.voxel) {
-        here.lowest = std::min(here.lowest, h);
-        here.highest = std::max(here.highest, h);
-      }
+      const bool at_surface = std::abs(value) <= before.voxel;
+      here.include({at_surface ? h : infinity, at_surface ? h : -infinity, h, -h});
       after.blocks[b].value[point] = static_cast<float>(std::clamp(value - h, before.inside, before.outside));
     }
   });
-  AppliedHeights all{infinity, -infinity, 0.0, 0.0};
+  AppliedHeights all;
   for (std::size_t b = 0; b < found.size(); ++b) {
     const PerBlock& here = found[b];
     if (here.bad < SparseBlock::points) {
@@ -220,20 +219,14 @@ Result<AppliedHeights> apply(const SparseSource& before, const PointHeight& heig
       const std::string place = fmt::format("texture at ({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z());
       if (!std::isfinite(here.bad_height))
         return bad_value("gives a height that is not a finite number", place, "finite heights");
-      return Error{
-          ErrorCode::bad_value,
-          fmt::format("gives a height of {:.6g} mm", 1e3 * here.bad_height),
-          {},
-          place,
+      return bad_value(
+          fmt::format("gives a height of {:.6g} mm", 1e3 * here.bad_height), place,
           limit > 0.0
               ? fmt::format("heights of up to {:.6g} mm up or down (the stored band less two voxels), or a wider band",
                             1e3 * limit)
-              : std::string("a stored band of more than two voxels on either side")};
+              : std::string("a stored band of more than two voxels on either side"));
     }
-    all.lowest = std::min(all.lowest, here.lowest);
-    all.highest = std::max(all.highest, here.highest);
-    all.up = std::max(all.up, here.up);
-    all.down = std::max(all.down, here.down);
+    all.include(here);
   }
   if (!(all.lowest <= all.highest)) all.lowest = all.highest = 0.0;
   return all;
@@ -263,8 +256,7 @@ void normalise(const SparseGrid& grid, SparseSource& source, const Progress& pro
       const double here = static_cast<double>(old[b][point]);
       const double far = (std::abs(here) / source.voxel - full_until) / (none_from - full_until);
       if (far >= 1.0 || !within_band(source, old[b][point])) continue;
-      const int at[3] = {static_cast<int>(point % side), static_cast<int>(point / side % side),
-                         static_cast<int>(point / side / side)};
+      const std::array<int, 3> at = place_in_block(point);
       double squared = 0.0;
       for (int a = 0; a < 3; ++a) {
         const int d[3] = {a == 0, a == 1, a == 2};
@@ -369,26 +361,22 @@ class Redistancer {
         next_(feet_) {}
 
   void run() {
-    const std::size_t blocks = feet_.size();
-    parallel_for(blocks, blocks_shared("redistancing", 0.3, 0.32, progress_), [&](std::size_t b) { seed(b); });
+    each_block(0.3, 0.32, [&](std::size_t b) { seed(b); });
     next_ = feet_;
     const int rounds = static_cast<int>(std::ceil(reach_ / voxel_)) + 2;
     for (int round = 0; round < rounds; ++round) {
-      parallel_for(blocks, blocks_shared("redistancing", 0.32, 0.4, progress_),
-                   [&](std::size_t b) { spread(b, nullptr); });
+      each_block(0.32, 0.4, [&](std::size_t b) { spread(b, nullptr); });
       feet_.swap(next_);
     }
-    std::vector<FootFinder> finders(parallel_workers(blocks, blocks_shared({}, 0.0, 1.0, progress_)),
+    std::vector<FootFinder> finders(parallel_workers(feet_.size(), blocks_shared({}, 0.0, 1.0, progress_)),
                                     FootFinder{field_, voxel_});
-    parallel_for(blocks, blocks_shared("redistancing", 0.4, 0.6, progress_),
-                 [&](std::size_t b, unsigned worker) { refine(b, finders[worker]); });
+    each_block(0.4, 0.6, [&](std::size_t b, unsigned worker) { refine(b, finders[worker]); });
     // A neighbour may have found a place that is nearer: start from there again.
     for (int round = 0; round < 2; ++round) {
-      parallel_for(blocks, blocks_shared("redistancing", 0.6, 0.7, progress_),
-                   [&](std::size_t b, unsigned worker) { spread(b, &finders[worker]); });
+      each_block(0.6, 0.7, [&](std::size_t b, unsigned worker) { spread(b, &finders[worker]); });
       feet_.swap(next_);
     }
-    parallel_for(blocks, blocks_shared("redistancing", 0.7, 0.72, progress_), [&](std::size_t b) { store(b); });
+    each_block(0.7, 0.72, [&](std::size_t b) { store(b); });
     textured_.outside = outside_;
     textured_.inside = inside_;
   }
@@ -397,6 +385,11 @@ class Redistancer {
   /// Way from a point to its nearest place of the surface (voxels).
   using Feet = std::array<Vec3f, SparseBlock::points>;
   static constexpr float nowhere = 1e6F;
+
+  template <class Work>
+  void each_block(double from, double to, const Work& work) {
+    parallel_for(feet_.size(), blocks_shared("redistancing", from, to, progress_), work);
+  }
 
   /// Two voxels at least, as the largest heights accepted leave; rounding takes nothing off them.
   static double band_left(double band, double height, double voxel) noexcept {
@@ -412,15 +405,14 @@ class Redistancer {
         [&](std::size_t from, std::size_t point) { return textured_.blocks[from].value[point]; },
         [](int) { return std::numeric_limits<float>::quiet_NaN(); });
     for (std::size_t point = 0; point < SparseBlock::points; ++point) {
-      const int at[3] = {static_cast<int>(point % side), static_cast<int>(point / side % side),
-                         static_cast<int>(point / side / side)};
+      const std::array<int, 3> at = place_in_block(point);
       const float here = value[padded_index(at[0], at[1], at[2])];
       Vec3f foot = Vec3f::Constant(nowhere);
-      float best = infinity_float;
+      float best = std::numeric_limits<float>::infinity();
       for (int a = 0; a < 3; ++a) {
         for (const int direction : {-1, 1}) {
-          int to[3] = {at[0], at[1], at[2]};
-          to[a] += direction;
+          std::array<int, 3> to = at;
+          to[static_cast<std::size_t>(a)] += direction;
           const float there = value[padded_index(to[0], to[1], to[2])];
           if (std::isnan(there) || (here >= 0.0F) == (there >= 0.0F)) continue;
           const float t = here / (here - there);
@@ -448,22 +440,17 @@ class Redistancer {
       next_[b][point] = own;
       if (!within_band(untextured_, untextured_.blocks[b].value[point])) continue;
       float least = margin * std::min(own.squaredNorm(), limit * limit);
-      const int at[3] = {static_cast<int>(point % side), static_cast<int>(point / side % side),
-                         static_cast<int>(point / side / side)};
+      const std::array<int, 3> at = place_in_block(point);
       bool nearer = false;
-      for (int k = -1; k <= 1; ++k) {
-        for (int j = -1; j <= 1; ++j) {
-          for (int i = -1; i <= 1; ++i) {
-            const Vec3f way = foot[padded_index(at[0] + i, at[1] + j, at[2] + k)] +
-                              Vec3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
-            const float squared = way.squaredNorm();
-            if (!(squared < least)) continue;
-            least = squared;
-            best = way;
-            nearer = true;
-          }
-        }
-      }
+      for_each_in_cube(-1, 2, [&](int i, int j, int k) {
+        const Vec3f way = foot[padded_index(at[0] + i, at[1] + j, at[2] + k)] +
+                          Vec3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
+        const float squared = way.squaredNorm();
+        if (!(squared < least)) return;
+        least = squared;
+        best = way;
+        nearer = true;
+      });
       if (!nearer) continue;
       if (finder != nullptr && !led(b, point, *finder, best)) continue;
       if (finder == nullptr || best.squaredNorm() < own.squaredNorm()) next_[b][point] = best;
@@ -505,7 +492,6 @@ class Redistancer {
     }
   }
 
-  static constexpr float infinity_float = std::numeric_limits<float>::infinity();
   ScalarField field_;
   const SparseSource& untextured_;
   SparseSource& textured_;
@@ -598,11 +584,6 @@ PointHeight coat_height(const Coat& coat, const TriangleMesh& mesh) {
     const TrianglePoint nearest = closest_point_on_triangle(p, corner[0], corner[1], corner[2]);
     return coat.sample(mesh, face, nearest.barycentric).height;
   };
-}
-
-Result<Redistancing> parse_redistancing(std::string_view name) {
-  if (const std::optional<Redistancing> mode = value_named<Redistancing>(name)) return *mode;
-  return bad_value(fmt::format("is \"{}\"", name), "", name_list<Redistancing>("", " or "));
 }
 
 Result<TexturedPotential> textured(const SparseGrid& grid, const PointHeight& height, Redistancing mode,

@@ -2,8 +2,6 @@
 // Implicit haptic texturing: heights that modulate a potential (hybrid-surface-2004, Fig. 7, and "Haptic decoration").
 
 #include <functional>
-#include <memory>
-#include <string_view>
 
 #include "asperity/core/names.h"
 #include "asperity/core/progress.h"
@@ -40,8 +38,6 @@ struct Names<Redistancing> {
                                                                     {Redistancing::normalised, "normalised"},
                                                                     {Redistancing::redistanced, "redistanced"}});
 };
-/// Errors: bad_value listing the names. [any]
-Result<Redistancing> parse_redistancing(std::string_view name);
 
 /// A textured potential and how far it is from a distance.
 struct TexturedPotential {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "asperity/field/volume/places.h"
+#include "asperity/geometry/clip.h"
 #include "asperity/surface/iso/surface.h"
 
 namespace asperity {
@@ -92,23 +94,6 @@ class CellWalk {
   CellIndex cell_;
 };
 
-/// The part of a motion that lies in a box; false when none does.
-bool clip(const Segment& motion, const Box& box, double& from, double& to) noexcept {
-  const Vec3 d = motion.to - motion.from;
-  for (int a = 0; a < 3; ++a) {
-    if (d[a] == 0.0) {
-      if (motion.from[a] < box.lower[a] || motion.from[a] > box.upper[a]) return false;
-      continue;
-    }
-    double t0 = (box.lower[a] - motion.from[a]) / d[a];
-    double t1 = (box.upper[a] - motion.from[a]) / d[a];
-    if (t0 > t1) std::swap(t0, t1);
-    from = std::max(from, t0);
-    to = std::min(to, t1);
-  }
-  return from <= to;
-}
-
 /// Leaves of the octree nearest first, cut off at what has been found.
 class NearestSearch {
  public:
@@ -154,10 +139,7 @@ class NearestSearch {
     for (int i = 0; i < count; ++i) {
       std::uint32_t first[3];
       std::uint32_t last[3];
-      for (std::size_t a = 0; a < 3; ++a) {
-        first[a] = octree.first_cell(children[i], a);
-        last[a] = octree.last_cell(children[i], a);
-      }
+      octree.cells_of(children[i], first, last);
       distance[i] = distance_to(first, last);
       int at = i;
       for (; at > 0 && distance[order[at - 1]] > distance[i]; --at) order[at] = order[at - 1];
@@ -169,23 +151,16 @@ class NearestSearch {
   }
 
   void visit_leaf(const MinMaxOctree::Node& node) noexcept {
-    const MinMaxOctree& octree = surface_.field->octree(surface_.level);
     const GridAxes& axes = surface_.field->axes(surface_.level);
     std::uint32_t first[3];
     std::uint32_t last[3];
-    for (std::size_t a = 0; a < 3; ++a) {
-      first[a] = octree.first_cell(node, a);
-      last[a] = std::min(octree.last_cell(node, a), axes[a].cells());
-    }
-    for (std::uint32_t k = first[2]; k < last[2]; ++k) {
-      for (std::uint32_t j = first[1]; j < last[1]; ++j) {
-        for (std::uint32_t i = first[0]; i < last[0]; ++i) {
-          const std::uint32_t low[3] = {i, j, k};
-          const std::uint32_t high[3] = {i + 1, j + 1, k + 1};
-          if (distance_to(low, high) < best_) visit_cell({{i, j, k}});
-        }
-      }
-    }
+    surface_.field->octree(surface_.level).cells_of(node, first, last);
+    for (std::size_t a = 0; a < 3; ++a) last[a] = std::min(last[a], axes[a].cells());
+    for_each_place(first, last, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+      const std::uint32_t low[3] = {i, j, k};
+      const std::uint32_t high[3] = {i + 1, j + 1, k + 1};
+      if (distance_to(low, high) < best_) visit_cell({{i, j, k}});
+    });
   }
 
   void visit_cell(const CellIndex& index) noexcept {
@@ -270,7 +245,8 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
   IsoCrossing crossing;
   double start = from;
   double end = 1.0;
-  if (motion.from == motion.to || !clip(motion, field->bounds(), start, end)) return crossing;
+  if (motion.from == motion.to || !clip_line(field->bounds(), motion.from, motion.to - motion.from, start, end))
+    return crossing;
   const GridAxes& axes = field->axes(level);
   const MinMaxOctree& octree = field->octree(level);
   CellWalk walk(axes, motion, start, end);
@@ -298,10 +274,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
           if (known) sign = there;
           std::uint32_t first[3];
           std::uint32_t last[3];
-          for (std::size_t a = 0; a < 3; ++a) {
-            first[a] = octree.first_cell(node, a);
-            last[a] = octree.last_cell(node, a);
-          }
+          octree.cells_of(node, first, last);
           more = walk.leave(first, last);
           continue;
         }
@@ -344,16 +317,9 @@ SweptHit IsoView::first_touch(const Segment& motion, Sides sides) const noexcept
   for (int i = 0; sides == Sides::front && crossing.found && !crossing.inward && i < most_crossings; ++i) {
     crossing = first_crossing(motion, crossing.t + 1e-9 * field->narrowest_cell() / length);
   }
-  SweptHit hit;
-  if (!crossing.found || (sides == Sides::front && !crossing.inward)) return hit;
-  hit.hit = true;
-  hit.t = crossing.t;
-  hit.side = crossing.inward ? 1.0 : -1.0;
-  hit.contact.point = hit.contact.at = crossing.point;
-  hit.contact.normal = hit.side * crossing.outward;
-  hit.contact.distance = 0.0;
-  hit.contact.element = element_of(crossing.cell);
-  return hit;
+  if (!crossing.found || (sides == Sides::front && !crossing.inward)) return {};
+  return point_touch(crossing.t, crossing.inward ? 1.0 : -1.0, crossing.point, crossing.outward,
+                     element_of(crossing.cell), crossing.point);
 }
 
 Foot IsoView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {

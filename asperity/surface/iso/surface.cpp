@@ -5,39 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/field/volume/places.h"
+
 namespace asperity {
-
-Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, double threshold, Inside inside,
-                                     double threshold_speed) {
-  if (field == nullptr) return bad_value("holds no field", "volume", "a scalar field");
-  if (!(threshold > field->lowest() && threshold < field->highest())) {
-    return Error{
-        ErrorCode::bad_value,
-        fmt::format("is {:g}, and the field ranges from {:g} to {:g}", threshold, field->lowest(), field->highest()),
-        {},
-        "threshold",
-        "a value between them"};
-  }
-  if (!(threshold_speed > 0.0 && std::isfinite(threshold_speed))) {
-    return Error{
-        ErrorCode::bad_value, fmt::format("is {:g}", threshold_speed), {}, "threshold_speed", "a speed above 0"};
-  }
-  IsoSurface surface;
-  surface.field_ = std::move(field);
-  surface.threshold_ = threshold;
-  surface.inside_ = inside;
-  surface.threshold_speed_ = threshold_speed;
-  surface.measure();
-  if (surface.surface_bounds_.empty()) {
-    return bad_value(fmt::format("is {:g}: nowhere in the volume does the field pass it", threshold), "threshold",
-                     "a value that the field passes");
-  }
-  return surface;
-}
-
-Result<IsoSurface> IsoSurface::with_threshold(double threshold) const {
-  return build(field_, threshold, inside_, threshold_speed_);
-}
 
 namespace {
 
@@ -65,10 +35,10 @@ std::vector<MinMaxOctree::Node> crossed_leaves(const ScalarField& field, int lev
 Box leaf_cells(const ScalarField& field, int level, const MinMaxOctree::Node& leaf, std::uint32_t first[3],
                std::uint32_t last[3]) {
   Box box;
+  field.octree(level).cells_of(leaf, first, last);
   for (std::size_t a = 0; a < 3; ++a) {
     const GridAxis& axis = field.axes(level)[a];
-    first[a] = field.octree(level).first_cell(leaf, a);
-    last[a] = std::min(field.octree(level).last_cell(leaf, a), axis.cells());
+    last[a] = std::min(last[a], axis.cells());
     box.lower[static_cast<int>(a)] = axis.node(first[a]);
     box.upper[static_cast<int>(a)] = axis.node(last[a]);
   }
@@ -76,6 +46,34 @@ Box leaf_cells(const ScalarField& field, int level, const MinMaxOctree::Node& le
 }
 
 }  // namespace
+
+Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, double threshold, Inside inside,
+                                     double threshold_speed) {
+  if (field == nullptr) return bad_value("holds no field", "volume", "a scalar field");
+  if (!(threshold > field->lowest() && threshold < field->highest())) {
+    return bad_value(
+        fmt::format("is {:g}, and the field ranges from {:g} to {:g}", threshold, field->lowest(), field->highest()),
+        "threshold", "a value between them");
+  }
+  if (!(threshold_speed > 0.0 && std::isfinite(threshold_speed))) {
+    return bad_value(fmt::format("is {:g}", threshold_speed), "threshold_speed", "a speed above 0");
+  }
+  IsoSurface surface;
+  surface.field_ = std::move(field);
+  surface.threshold_ = threshold;
+  surface.inside_ = inside;
+  surface.threshold_speed_ = threshold_speed;
+  surface.measure();
+  if (surface.surface_bounds_.empty()) {
+    return bad_value(fmt::format("is {:g}: nowhere in the volume does the field pass it", threshold), "threshold",
+                     "a value that the field passes");
+  }
+  return surface;
+}
+
+Result<IsoSurface> IsoSurface::with_threshold(double threshold) const {
+  return build(field_, threshold, inside_, threshold_speed_);
+}
 
 /// Bounds and typical slope, from the cells that the surface crosses: all of a small volume's, a sample of a large
 /// one's. A volume in bricks is measured on its coarsest level, the one that is always here.
@@ -95,15 +93,11 @@ void IsoSurface::measure() {
                         (box.upper.array() <= surface_bounds_.upper.array()).all();
     if (inside && n % stride != 0) continue;
     field_->enter();
-    for (std::uint32_t k = first[2]; k < last[2]; ++k) {
-      for (std::uint32_t j = first[1]; j < last[1]; ++j) {
-        for (std::uint32_t i = first[0]; i < last[0]; ++i) {
-          if (field_->approach(level, {{i, j, k}}, threshold_, cell) != CellSide::near) continue;
-          surface_bounds_.include(Box{cell.lower, cell.upper()});
-          if (n % stride == 0) slopes.push_back(cell.gradient(cell.lower + 0.5 * cell.width).gradient.norm());
-        }
-      }
-    }
+    for_each_place(first, last, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+      if (field_->approach(level, {{i, j, k}}, threshold_, cell) != CellSide::near) return;
+      surface_bounds_.include(Box{cell.lower, cell.upper()});
+      if (n % stride == 0) slopes.push_back(cell.gradient(cell.lower + 0.5 * cell.width).gradient.norm());
+    });
     field_->leave();
   }
   if (slopes.empty() && bricked) {

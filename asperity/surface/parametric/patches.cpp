@@ -33,35 +33,12 @@ ParametricPatches::ParametricPatches(int levels, const std::vector<Box>& leaves)
   for (unsigned level = deepest; level-- > 0;) {
     for (std::uint32_t row = 0; row < (1U << level); ++row) {
       for (std::uint32_t column = 0; column < (1U << level); ++column) {
-        FloatBox all = boxes_[index(level + 1, 2 * column, 2 * row)];
-        for (std::uint32_t k = 1; k < 4; ++k) {
-          const FloatBox& child = boxes_[index(level + 1, 2 * column + (k & 1U), 2 * row + (k >> 1U))];
-          for (int a = 0; a < 3; ++a) {
-            all.lower[a] = std::min(all.lower[a], child.lower[a]);
-            all.upper[a] = std::max(all.upper[a], child.upper[a]);
-          }
-        }
-        boxes_[index(level, column, row)] = all;
+        FloatBox& all = boxes_[index(level, column, row)];
+        for (std::uint32_t k = 0; k < 4; ++k)
+          all.include(boxes_[index(level + 1, 2 * column + (k & 1U), 2 * row + (k >> 1U))]);
       }
     }
   }
-}
-
-double ParametricPatches::entry(const Box& box, const Vec3& from, const Vec3& direction) noexcept {
-  double first = 0.0;
-  double last = 1.0;
-  for (int a = 0; a < 3; ++a) {
-    if (direction[a] == 0.0) {
-      if (from[a] < box.lower[a] || from[a] > box.upper[a]) return infinity;
-      continue;
-    }
-    double in = (box.lower[a] - from[a]) / direction[a];
-    double out = (box.upper[a] - from[a]) / direction[a];
-    if (in > out) std::swap(in, out);
-    first = std::max(first, in);
-    last = std::min(last, out);
-  }
-  return first <= last ? first : infinity;
 }
 
 }  // namespace asperity

@@ -2,11 +2,12 @@
 // A quadtree of boxes over the parameters of a surface: what a ray passes, and what is near a point.
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/geometry/clip.h"
+#include "asperity/geometry/simd_kernels.h"
 
 namespace asperity {
 
@@ -32,21 +33,22 @@ class ParametricPatches {
   void along(const Segment& segment, const double& until, Leaf&& leaf) const noexcept {
     if (boxes_.empty()) return;
     const Vec3 direction = segment.to - segment.from;
-    visit([&](const Box& box) { return entry(box, segment.from, direction); }, until, leaf);
+    const auto entry = [&](const Box& box) {
+      double first = 0.0;
+      double last = 1.0;
+      return clip_line(box, segment.from, direction, first, last) ? first : infinity;
+    };
+    visit(entry, until, leaf);
   }
   /// Calls leaf(column, row) for patches whose box comes nearer to `p` than `bound` (m), nearer ones first as a rule;
   /// `bound` may be lowered by the callee. [servo]
   template <class Leaf>
   void near(const Vec3& p, const double& bound, Leaf&& leaf) const noexcept {
     if (boxes_.empty()) return;
-    visit([&](const Box& box) { return (p - p.cwiseMax(box.lower).cwiseMin(box.upper)).norm(); }, bound, leaf);
+    visit([&](const Box& box) { return box.distance(p); }, bound, leaf);
   }
 
  private:
-  struct FloatBox {
-    float lower[3];
-    float upper[3];
-  };
   struct Node {
     double key = 0.0;
     std::uint16_t level = 0;
@@ -62,9 +64,6 @@ class ParametricPatches {
     return {Vec3(static_cast<double>(b.lower[0]), static_cast<double>(b.lower[1]), static_cast<double>(b.lower[2])),
             Vec3(static_cast<double>(b.upper[0]), static_cast<double>(b.upper[1]), static_cast<double>(b.upper[2]))};
   }
-  /// Fraction at which the segment enters a box; infinity where it misses it.
-  [[nodiscard]] static double entry(const Box& box, const Vec3& from, const Vec3& direction) noexcept;
-
   /// Depth first, the child with the least key first; what has no lower key than `limit` is passed over.
   template <class Key, class Leaf>
   void visit(const Key& key, const double& limit, Leaf&& leaf) const noexcept {

@@ -328,20 +328,7 @@ class Nearest {
     limit_ = best_ - tolerance_;
   }
 
-  /// From a place that may be near it already.
-  void start(const Vec2& place) noexcept { take(place); }
-
-  void run(const ParametricPatches& tree) noexcept {
-    tree.near(p_, limit_,
-              [&](std::uint32_t column, std::uint32_t row) { refine(patches_.leaf(column, row, tree.count())); });
-  }
-
-  bool found = false;
-  Vec2 uv = Vec2::Zero();
-  ParametricSpot spot;
-  [[nodiscard]] double distance() const noexcept { return best_; }
-
- private:
+  /// Descends from a place to the nearest one around, and keeps that where it is the best.
   void take(const Vec2& from) noexcept {
     ParametricSpot at = surface_.view().spot(from);
     Place place{0, at.front.dot(p_ - at.point) < 0.0, {from.x(), from.y(), 0.0}};
@@ -354,7 +341,17 @@ class Nearest {
     uv = place.at.head<2>();
     spot = at;
   }
+  void run(const ParametricPatches& tree) noexcept {
+    tree.near(p_, limit_,
+              [&](std::uint32_t column, std::uint32_t row) { refine(patches_.leaf(column, row, tree.count())); });
+  }
 
+  bool found = false;
+  Vec2 uv = Vec2::Zero();
+  ParametricSpot spot;
+  [[nodiscard]] double distance() const noexcept { return best_; }
+
+ private:
   [[nodiscard]] double least(const Patch& patch, const Bound& bound) const noexcept {
     const Vec3 off = p_ - bound.jet.point;
     const double around = off.norm() - bound.reach;
@@ -413,7 +410,7 @@ Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) co
   Foot foot;
   if (!(bound >= 0.0)) return foot;
   Nearest search(*surface_, p, bound);
-  if (start.known()) search.start(surface_->within_range(start.at.head<2>()));
+  if (start.known()) search.take(surface_->within_range(start.at.head<2>()));
   search.run(surface_->patches_);
   if (!search.found) return foot;
   foot.point = search.spot.point;
@@ -426,20 +423,13 @@ Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) co
 }
 
 SweptHit ParametricView::first_touch(const Segment& motion, Sides sides) const noexcept {
-  SweptHit hit;
   Crossing crossing(*surface_, motion, sides);
   crossing.run(surface_->patches_);
-  if (!crossing.found) return hit;
+  if (!crossing.found) return {};
   const ParametricSpot there = spot(crossing.uv);
-  hit.hit = true;
-  hit.t = crossing.t;
-  hit.side = there.front.dot(motion.to - motion.from) > 0.0 ? -1.0 : 1.0;
-  hit.contact.point = there.point;
-  hit.contact.normal = hit.side * there.front;
-  hit.contact.distance = 0.0;
-  hit.contact.element = surface_->element_of(crossing.uv);
-  hit.contact.at = {crossing.uv.x(), crossing.uv.y(), 0.0};
-  return hit;
+  const double side = there.front.dot(motion.to - motion.from) > 0.0 ? -1.0 : 1.0;
+  return point_touch(crossing.t, side, there.point, there.front, surface_->element_of(crossing.uv),
+                     {crossing.uv.x(), crossing.uv.y(), 0.0});
 }
 
 FieldSample ParametricView::eval(const Vec3& p) const noexcept {

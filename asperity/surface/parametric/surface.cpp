@@ -243,20 +243,17 @@ void ParametricSurface::make_patches() {
   for (int row = 0; row < side; ++row) {
     for (int column = 0; column < side; ++column) {
       const Vec2 corner = lower_ + Vec2(column * step.x(), row * step.y());
-      double low = 0.0;
-      double high = 0.0;
-      if (!settings_.features.empty()) {
-        low = infinity;
-        high = -infinity;
-        for (int k = 0; k < 4; ++k) {
-          const Vec2 place = corner + Vec2((k & 1 ? 0.75 : 0.25) * step.x(), (k & 2 ? 0.75 : 0.25) * step.y());
-          const double h = feature_heights(settings_, place).height;
-          low = std::min(low, h - rest);
-          high = std::max(high, h + rest);
-        }
-        low = std::max(low, limits_.lowest);
-        high = std::min(high, limits_.highest);
+      // Without features the limits are 0, and so are both.
+      double low = infinity;
+      double high = -infinity;
+      for (int k = 0; k < 4; ++k) {
+        const Vec2 place = corner + Vec2((k & 1 ? 0.75 : 0.25) * step.x(), (k & 2 ? 0.75 : 0.25) * step.y());
+        const double h = feature_heights(settings_, place).height;
+        low = std::min(low, h - rest);
+        high = std::max(high, h + rest);
       }
+      low = std::max(low, limits_.lowest);
+      high = std::min(high, limits_.highest);
       Box box;
       for (int k = 0; k < 4; ++k) {
         ParametricJet jet;

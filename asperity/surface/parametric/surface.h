@@ -1,8 +1,7 @@
 #pragma once
 // Surfaces given by formulas over two parameters: no triangles, no samples.
 
-#include <memory>
-#include <string_view>
+#include <string>
 #include <vector>
 
 #include "asperity/core/result.h"
@@ -148,9 +147,7 @@ class ParametricSurface {
 
 /// "plane", "cylinder", "sphere", "torus", "vase", "ramp". [any]
 const char* parametric_name(ParametricShape shape);
-/// Errors: bad_value listing the names. [any]
-Result<ParametricShape> parametric_by_name(std::string_view name);
-/// Every name that parametric_by_name accepts. [any]
+/// Every shape's name. [any]
 const std::vector<std::string>& parametric_names();
 /// The members of ParametricSettings that a shape takes, by the names that scene files give them. [any]
 const std::vector<std::string>& parametric_parameters(ParametricShape shape);

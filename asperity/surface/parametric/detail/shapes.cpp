@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace asperity {
 
@@ -133,27 +135,6 @@ void ramp(const ParametricSettings& s, const Vec2& uv, ParametricJet& out, Norma
   normals->vv = g * m_vv + 2.0 * g1 * m_v + g2 * m;
 }
 
-struct Entry {
-  ParametricShape shape;
-  std::vector<std::string> parameters;
-};
-
-const std::vector<Entry>& table() {
-  static const std::vector<Entry> entries = {
-      {ParametricShape::plane, {"width", "depth", "tile"}},
-      {ParametricShape::cylinder, {"radius", "height", "tile"}},
-      {ParametricShape::sphere, {"radius", "tile"}},
-      {ParametricShape::torus, {"radius", "tube", "tile"}},
-      {ParametricShape::vase, {"radius", "height", "neck", "tile"}},
-      {ParametricShape::ramp, {"scale", "tile"}},
-  };
-  return entries;
-}
-
-const Entry& entry_of(ParametricShape shape) {
-  return table()[static_cast<std::size_t>(shape)];
-}
-
 Status check_length(double value, const char* place) {
   constexpr double shortest = 1e-6;
   constexpr double longest = 1e3;
@@ -210,18 +191,13 @@ void shape_range(const ParametricSettings& settings, Vec2& lower, Vec2& upper) {
 }
 
 Status check_shape(const ParametricSettings& s) {
-  const auto takes = [&](const char* name) {
-    for (const std::string& parameter : parametric_parameters(s.shape)) {
-      if (parameter == name) return true;
-    }
-    return false;
-  };
-  if (takes("width")) ASPERITY_CHECK(check_length(s.width, "width"));
-  if (takes("depth")) ASPERITY_CHECK(check_length(s.depth, "depth"));
-  if (takes("radius")) ASPERITY_CHECK(check_length(s.radius, "radius"));
-  if (takes("tube")) ASPERITY_CHECK(check_length(s.tube, "tube"));
-  if (takes("height")) ASPERITY_CHECK(check_length(s.height, "height"));
-  if (takes("scale")) ASPERITY_CHECK(check_length(s.scale, "scale"));
+  const std::vector<std::string>& taken = parametric_parameters(s.shape);
+  const auto takes = [&](const char* name) { return std::find(taken.begin(), taken.end(), name) != taken.end(); };
+  const std::pair<const char*, double> lengths[] = {{"width", s.width}, {"depth", s.depth},   {"radius", s.radius},
+                                                    {"tube", s.tube},   {"height", s.height}, {"scale", s.scale}};
+  for (const auto& [name, length] : lengths) {
+    if (takes(name)) ASPERITY_CHECK(check_length(length, name));
+  }
   if (takes("tube") && !(s.tube <= 0.95 * s.radius)) {
     return bad_value(fmt::format("is {} on a radius of {}", s.tube, s.radius), "tube",
                      "at most 0.95 of the radius, so that the torus stays open in the middle");
@@ -241,17 +217,20 @@ const char* parametric_name(ParametricShape shape) {
   return to_string(shape);
 }
 
-Result<ParametricShape> parametric_by_name(std::string_view name) {
-  if (const std::optional<ParametricShape> shape = value_named<ParametricShape>(name)) return *shape;
-  return bad_value(fmt::format("is \"{}\", which is no parametric surface", name), "", name_list<ParametricShape>());
-}
-
 const std::vector<std::string>& parametric_names() {
   return all_names<ParametricShape>();
 }
 
 const std::vector<std::string>& parametric_parameters(ParametricShape shape) {
-  return entry_of(shape).parameters;
+  static const std::vector<std::string> of_shape[] = {
+      {"width", "depth", "tile"},            // plane
+      {"radius", "height", "tile"},          // cylinder
+      {"radius", "tile"},                    // sphere
+      {"radius", "tube", "tile"},            // torus
+      {"radius", "height", "neck", "tile"},  // vase
+      {"scale", "tile"},                     // ramp
+  };
+  return of_shape[static_cast<std::size_t>(shape)];
 }
 
 }  // namespace asperity
