@@ -211,11 +211,6 @@ void list_faces_of_vertices(std::size_t vertices, const std::vector<Triangle>& t
   offsets[0] = 0;
 }
 
-void flip_all(std::vector<Triangle>& triangles, std::vector<std::array<Vec2f, 3>>& corner_uvs) {
-  for (Triangle& t : triangles) std::swap(t[1], t[2]);
-  for (auto& uvs : corner_uvs) std::swap(uvs[1], uvs[2]);
-}
-
 void add_notes(const MeshReport& report, std::size_t unused_vertices, std::vector<std::string>& notes) {
   const auto note = [&](std::size_t count, const char* text) {
     if (count > 0) notes.push_back(fmt::format("{} {}", count, text));
@@ -351,7 +346,8 @@ void TriangleMesh::derive(MeshSource source, bool orient_outward) {
   std::vector<Vec3> sums;
   static_cast<void>(measure_faces(sums));
   if (orient_outward && report_.closed() && report_.oriented() && report_.signed_volume < 0.0) {
-    flip_all(topology->triangles, topology->corner_uvs);
+    for (Triangle& t : topology->triangles) std::swap(t[1], t[2]);
+    for (auto& uvs : topology->corner_uvs) std::swap(uvs[1], uvs[2]);
     static_cast<void>(measure_faces(sums));
     topology->notes.emplace_back("normals pointed inward: all triangles were flipped");
   }

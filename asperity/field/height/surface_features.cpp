@@ -309,20 +309,14 @@ FeatureSample SurfaceFeature::sample(const Vec2& uv) const noexcept {
 }
 
 Vec2 SurfaceFeature::across(const Vec2& uv) const noexcept {
-  switch (spec_.kind) {
-    case FeatureKind::grating:
-    case FeatureKind::triangular:
-    case FeatureKind::serrated: return axis_;
-    case FeatureKind::circular_grating: {
-      const Vec2 from_centre = uv - spec_.centre;
-      const double distance = from_centre.norm();
-      return distance > 0.0 ? Vec2(from_centre / distance) : Vec2(Vec2::Zero());
-    }
-    case FeatureKind::grid:
-    case FeatureKind::noise:
-    case FeatureKind::map: break;
+  if (spec_.kind == FeatureKind::circular_grating) {
+    const Vec2 from_centre = uv - spec_.centre;
+    const double distance = from_centre.norm();
+    return distance > 0.0 ? Vec2(from_centre / distance) : Vec2(Vec2::Zero());
   }
-  return Vec2::Zero();
+  const bool straight = spec_.kind == FeatureKind::grating || spec_.kind == FeatureKind::triangular ||
+                        spec_.kind == FeatureKind::serrated;
+  return straight ? axis_ : Vec2(Vec2::Zero());
 }
 
 std::size_t SurfaceFeature::memory_bytes() const noexcept {

@@ -84,11 +84,8 @@ std::vector<Integer> scaled_to(const std::vector<float>& samples) {
 }
 
 SampleArray as_type(std::vector<float> samples, SampleType type) {
-  switch (type) {
-    case SampleType::int16: return scaled_to<std::int16_t>(samples);
-    case SampleType::uint8: return scaled_to<std::uint8_t>(samples);
-    case SampleType::float32: break;
-  }
+  if (type == SampleType::int16) return scaled_to<std::int16_t>(samples);
+  if (type == SampleType::uint8) return scaled_to<std::uint8_t>(samples);
   return samples;
 }
 
