@@ -25,6 +25,7 @@
 
 // geometry: triangle meshes and how they are searched
 #include "asperity/geometry/bvh.h"
+#include "asperity/geometry/clip.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/generators.h"
@@ -59,6 +60,7 @@
 #include "asperity/field/volume/grid_axis.h"
 #include "asperity/field/volume/material_brush.h"
 #include "asperity/field/volume/min_max_octree.h"
+#include "asperity/field/volume/places.h"
 #include "asperity/field/volume/scalar_field.h"
 #include "asperity/field/volume/scalar_grid.h"
 #include "asperity/field/volume/sparse_grid.h"
