@@ -29,7 +29,15 @@ class FixedVector {
     return true;
   }
   /// Appends a default-constructed value and answers it, or nullptr when full.
-  T* emplace_back() noexcept { return size_ == Capacity ? nullptr : new (&values_[size_++]) T(); }
+  T* emplace_back() noexcept {
+    if (size_ == Capacity) return nullptr;
+    // T() would fill a struct with zeros before its members get their own values.
+    if constexpr (std::is_class_v<T>) {
+      return new (&values_[size_++]) T;
+    } else {
+      return new (&values_[size_++]) T();
+    }
+  }
   void clear() noexcept { size_ = 0; }
   /// Removes element `index`; the last one takes its place.
   void swap_remove(std::size_t index) noexcept {

@@ -23,7 +23,7 @@ struct Pose {
   [[nodiscard]] Vec3 rotate(const Vec3& direction) const { return orientation * direction; }
   [[nodiscard]] Vec3 rotate_inverse(const Vec3& direction) const { return orientation.conjugate() * direction; }
   [[nodiscard]] bool is_identity() const {
-    return position.isZero(0.0) && orientation.w() == 1.0 && orientation.vec().isZero(0.0);
+    return position == Vec3::Zero() && orientation.w() == 1.0 && orientation.vec() == Vec3::Zero();
   }
 };
 

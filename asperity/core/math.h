@@ -50,7 +50,8 @@ struct Box {
   /// Length of the diagonal (m); 0 for an empty box.
   [[nodiscard]] double diagonal() const { return empty() ? 0.0 : extent().norm(); }
   [[nodiscard]] bool overlaps(const Box& other) const {
-    return (lower.array() <= other.upper.array()).all() && (other.lower.array() <= upper.array()).all();
+    return lower.x() <= other.upper.x() && lower.y() <= other.upper.y() && lower.z() <= other.upper.z() &&
+           other.lower.x() <= upper.x() && other.lower.y() <= upper.y() && other.lower.z() <= upper.z();
   }
   /// From a point to the nearest of the box (m); 0 inside.
   [[nodiscard]] double distance(const Vec3& p) const { return (p - p.cwiseMax(lower).cwiseMin(upper)).norm(); }

@@ -36,7 +36,7 @@ class TouchedSurface {
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
   /// The nearest point within `bound` (m). [servo]
   [[nodiscard]] Foot nearest(const Vec3& p, double bound) const noexcept;
-  [[nodiscard]] Sides sides() const noexcept { return instance_->sides.value_or(natural_sides(instance_->surface)); }
+  [[nodiscard]] Sides sides() const noexcept { return sides_of(*instance_); }
   /// What it is, for laws of one kind of surface. [servo]
   [[nodiscard]] const Surface& surface() const noexcept { return instance_->surface; }
 

@@ -71,16 +71,24 @@ struct Touched {
 
 /// The surface as the instance's law feels it, at its contact's threshold and level and a moment of its coat. [servo]
 inline FeltView felt_view(const Touched& touch) noexcept {
-  const Instance& instance = *touch.instance;
   SurfaceCache& cache = *touch.cache;
-  if (const auto* relief = provider_of<ReliefSurface>(instance.surface);
-      relief != nullptr && (touch.facts->smooth || !touch.facts->constrains))
-    return relief->view(cache, touch.moment);
-  if (const IsoSurface* iso = iso_of(instance.surface))
-    return iso->view(cache.cells, touch.contact->surface.level, touch.contact->surface.threshold);
-  if (const ParametricSurface* parametric = parametric_of(instance.surface)) return parametric->view();
-  if (const CustomSurface* custom = custom_of(instance.surface)) return custom->view();
-  return constraint_mesh(instance)->view(cache);
+  const OfSurface& felt = touch.contact->surface;
+  return std::visit(
+      [&]<class Provider>(const std::shared_ptr<const Provider>& surface) -> FeltView {
+        if constexpr (std::is_same_v<Provider, ImplicitSurface>) {
+          return surface->iso().view(cache.cells, felt.level, felt.threshold);
+        } else if constexpr (std::is_same_v<Provider, IsoSurface>) {
+          return surface->view(cache.cells, felt.level, felt.threshold);
+        } else if constexpr (std::is_same_v<Provider, MeshSurface> || std::is_same_v<Provider, ReliefSurface>) {
+          if constexpr (std::is_same_v<Provider, ReliefSurface>) {
+            if (touch.facts->smooth || !touch.facts->constrains) return surface->view(cache, touch.moment);
+          }
+          return constraint_mesh(*touch.instance)->view(cache);
+        } else {
+          return surface->view();
+        }
+      },
+      touch.instance->surface);
 }
 
 }  // namespace asperity

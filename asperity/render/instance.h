@@ -97,6 +97,11 @@ struct Instance {
   std::shared_ptr<const DenseMesh> dense = nullptr;
 };
 
+/// The sides that can be touched. [any]
+inline Sides sides_of(const Instance& instance) noexcept {
+  return instance.sides.value_or(natural_sides(instance.surface));
+}
+
 /// What a tick asks of an instance again and again: found out when the scene is built.
 struct InstanceFacts {
   std::uint64_t identity = 0;   ///< surface_identity
@@ -110,7 +115,10 @@ struct InstanceFacts {
   bool holds_friction = false;  ///< the proxy is the anchor of its friction
   bool rubs = false;            ///< and there may be some
   bool adds_friction = false;   ///< friction is a force of its own
-  bool changes = false;         ///< it may move or change its shape under the probe
+  bool moves = false;           ///< by itself
+  bool at_origin = false;       ///< and stays at the world's axes
+  bool changes = false;         ///< and the surface may move or change its shape under the proxy
+  bool moment = false;          ///< its coat moves or has levels of detail, and its law feels which
   bool draws = false;           ///< it draws the probe from outside
 };
 

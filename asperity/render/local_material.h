@@ -18,6 +18,15 @@ inline Material local_material(const Touched& touch, const Vec3& p) noexcept {
   return local_material(*touch.instance, touch.resting_place(), p, touch.moment, *touch.cache);
 }
 
+/// Holds what an instance is made of where that differs from place to place.
+using MaterialRoom = FixedVector<Material, 1>;
+/// The same, without a copy where it is made of one thing. [servo]
+inline const Material& material_there(const Touched& touch, const Vec3& place, MaterialRoom& room) noexcept {
+  if (!touch.facts->varies) return touch.instance->material;
+  room.clear();
+  return *room.emplace_back() = local_material(touch, place);
+}
+
 /// A place on a coated mesh.
 struct CoatPlace {
   bool found = false;

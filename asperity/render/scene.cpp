@@ -275,21 +275,26 @@ Box swept_bounds(const Instance& instance, const Box& local) {
   return way.allFinite() ? all : all.grown(farthest);
 }
 
+/// Whether its coat moves or has levels of detail, and its law feels which.
+bool feels_changing_coat(const Instance& instance) {
+  const ReliefSurface* relief = relief_of(instance);
+  return relief != nullptr && feels_moment(instance.law) && (relief->coat().moves() || relief->coat().levels() > 0);
+}
+
 /// Whether the surface may move or change its shape under the probe.
 bool changes(const Instance& instance) {
   if (instance.motion.moves()) return true;
   if (iso_of(instance.surface) != nullptr) return false;
   const MeshSurface* base = base_of(instance.surface);
   if (base != nullptr && base->index().identity() != base->index().lineage()) return true;
-  const ReliefSurface* relief = relief_of(instance);
-  return relief != nullptr && feels_moment(instance.law) && (relief->coat().moves() || relief->coat().levels() > 0);
+  return feels_changing_coat(instance);
 }
 
 InstanceFacts facts_of(const Instance& instance) {
   const Material& material = instance.material;
   InstanceFacts facts;
   facts.identity = surface_identity(instance.surface);
-  facts.sides = instance.sides.value_or(natural_sides(instance.surface));
+  facts.sides = sides_of(instance);
   facts.constrains = constrains(instance.law);
   facts.smooth = follows_smoothly(instance);
   facts.facets = std::holds_alternative<GeneratedGeometryLaw>(instance.law);
@@ -300,7 +305,10 @@ InstanceFacts facts_of(const Instance& instance) {
   facts.rubs =
       facts.holds_friction && (facts.varies || material.static_friction > 0.0 || material.dynamic_friction > 0.0);
   facts.adds_friction = adds_friction(instance);
-  facts.changes = changes(instance);
+  facts.moves = instance.motion.moves();
+  facts.at_origin = !facts.moves && instance.world_from_object.is_identity();
+  facts.changes = facts.constrains && changes(instance);
+  facts.moment = feels_changing_coat(instance);
   facts.draws = attraction_reach(instance) > 0.0;
   return facts;
 }
@@ -358,6 +366,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
         instances[i], bounds.grown(scene.probe_radius() + attraction_reach(instances[i]) / settings.view.zoom +
                                    1e-6 * bounds.diagonal())));
   }
+  scene.direct_ = settings.view.identity();
   scene.reads_volumes_ = !effects.empty();
   for (const Instance& instance : instances) {
     scene.reads_volumes_ = scene.reads_volumes_ || iso_of(instance.surface) != nullptr;
@@ -371,7 +380,10 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
     scene.given_effects_ = scene.felt_effects_;
     for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
   }
-  for (const Instance& instance : scene.felt_) scene.facts_.push_back(facts_of(instance));
+  for (const Instance& instance : scene.felt_) {
+    scene.facts_.push_back(facts_of(instance));
+    scene.changes_ = scene.changes_ || scene.facts_.back().changes;
+  }
   std::vector<std::uint32_t> order(scene.bounds_.size());
   std::iota(order.begin(), order.end(), 0U);
   scene.plant(order, 0, order.size());

@@ -51,8 +51,12 @@ class Scene {
   }
   /// Whether a tick may read a volume: for an isosurface or an effect. [servo]
   [[nodiscard]] bool reads_volumes() const noexcept { return reads_volumes_; }
+  /// Whether the scene is the workspace: the view changes nothing. [servo]
+  [[nodiscard]] bool direct() const noexcept { return direct_; }
   /// Whether an instance moves on by itself. [servo]
   [[nodiscard]] bool moves() const noexcept { return moves_; }
+  /// Whether a surface that moves the proxy may move or change its shape under it. [servo]
+  [[nodiscard]] bool changes() const noexcept { return changes_; }
   /// Radius of the probe's tip in the scene (m); 0 is a point. [servo]
   [[nodiscard]] double probe_radius() const noexcept { return settings_.probe_radius / settings_.view.zoom; }
   /// Tells snapshots apart, never 0. A state made for another one re-acquires its contacts. [servo]
@@ -60,12 +64,13 @@ class Scene {
   /// World bounds of instance `index`, coat and motion included (m). [servo]
   [[nodiscard]] const Box& world_bounds(std::size_t index) const noexcept { return bounds_[index]; }
   [[nodiscard]] Box world_bounds() const noexcept;
-  /// Calls visit(instance) for each whose world bounds meet `box`. [servo]
-  template <class Visit>
-  void for_each_in_box(const Box& box, Visit&& visit) const noexcept {
+  /// Calls visit(instance) for each whose world bounds meet `box`, but for those in boxes around several of which
+  /// matters(box) is false. [servo]
+  template <class Visit, class Matters>
+  void for_each_in_box(const Box& box, Visit&& visit, Matters&& matters) const noexcept {
     for (std::uint32_t i = 0; i < tree_.size();) {
       const Node& node = tree_[i];
-      const bool near = node.box.overlaps(box);
+      const bool near = node.box.overlaps(box) && matters(node.box);
       if (near && node.instance != no_index) visit(node.instance);
       i = near ? i + 1 : node.past;
     }
@@ -96,6 +101,8 @@ class Scene {
   std::uint64_t epoch_ = 0;
   bool reads_volumes_ = false;
   bool moves_ = false;
+  bool changes_ = false;
+  bool direct_ = true;
 };
 
 }  // namespace asperity

@@ -28,7 +28,7 @@ struct View {
 
   /// Whether workspace and scene are the same. [servo]
   [[nodiscard]] bool identity() const noexcept {
-    return zoom == 1.0 && focus == home && orientation.w() == 1.0 && orientation.vec().isZero(0.0);
+    return zoom == 1.0 && focus == home && orientation.w() == 1.0 && orientation.vec() == Vec3::Zero();
   }
   /// [servo]
   [[nodiscard]] Vec3 to_scene(const Vec3& p) const noexcept { return focus + orientation * (p - home) / zoom; }
@@ -49,7 +49,9 @@ struct Motion {
   Twist velocity;        ///< of the instance's origin, and about it
   Seconds since{0.0};    ///< when the instance was at its pose, on the clock of ProbeSample::time
   Seconds horizon{0.1};  ///< from then on it is not trusted: the instance stands still
-  [[nodiscard]] bool moves() const noexcept { return !velocity.linear.isZero(0.0) || !velocity.angular.isZero(0.0); }
+  [[nodiscard]] bool moves() const noexcept {
+    return velocity.linear != Vec3::Zero() || velocity.angular != Vec3::Zero();
+  }
   /// Where an instance of this pose is at a time. Before `since`: at its pose. [servo]
   [[nodiscard]] Pose at(const Pose& pose, Seconds time) const noexcept;
   /// Velocity of the instance's point that is at p, then (m/s). [servo]

@@ -362,7 +362,7 @@ CoatFrame Coat::layer_frame(const CoatFrame& frame, const CoatLayer& layer) cons
   return laid;
 }
 
-HeightJet Coat::jet(const CoatFrame& frame, double u, double v) const noexcept {
+HeightJet Coat::layered_jet(const CoatFrame& frame, double u, double v) const noexcept {
   HeightJet sum = own_jet(frame, u, v);
   for (const CoatLayer& layer : frame.layers) {
     HeightJet more;
@@ -399,8 +399,8 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
   const Vec3 point = place_at(frame, u, v);
   const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
   const Vec2& tile = frame.maps->tile();
-  HeightJet sum;     // of w H
-  HeightJet weight;  // of w
+  HeightJet sum{};     // of w H
+  HeightJet weight{};  // of w
   const double length = normal.squaredNorm();
   const double length_u = normal.dot(frame.normal_u);
   const double length_v = normal.dot(frame.normal_v);

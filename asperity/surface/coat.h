@@ -67,12 +67,12 @@ struct CoatSample {
 
 /// Height over one triangle as a function of its barycentric coordinates (u, v) of the second and third corner.
 struct HeightJet {
-  double height = 0.0;  ///< m
-  double u = 0.0;       ///< dH/du (m)
-  double v = 0.0;
-  double uu = 0.0;  ///< second derivatives (m)
-  double uv = 0.0;
-  double vv = 0.0;
+  double height;  ///< m
+  double u;       ///< dH/du (m)
+  double v;
+  double uu;  ///< second derivatives (m)
+  double uv;
+  double vv;
 };
 
 /// The mapping of one triangle, ready to be sampled: what a probe that stays on it need not fetch again.
@@ -122,7 +122,9 @@ class Coat {
   [[nodiscard]] CoatFrame frame(const TriangleMesh& mesh, std::uint32_t face,
                                 const CoatMoment& moment = {}) const noexcept;
   /// The face's own height with its derivatives, before any stitching; (u, v) may lie outside the triangle. [servo]
-  [[nodiscard]] HeightJet jet(const CoatFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet jet(const CoatFrame& frame, double u, double v) const noexcept {
+    return frame.layers.empty() ? own_jet(frame, u, v) : layered_jet(frame, u, v);
+  }
   /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
   [[nodiscard]] HeightRange range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
   /// Whether heights may differ between neighbours at some edge, so that they have to be stitched. [any]
@@ -170,6 +172,7 @@ class Coat {
                                             const Vec3& barycentric) const noexcept;
 
   [[nodiscard]] HeightJet own_jet(const CoatFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet layered_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightRange own_range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
   [[nodiscard]] CoatFrame layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept;

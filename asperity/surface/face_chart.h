@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "asperity/geometry/mesh.h"
 #include "asperity/surface/face_place.h"
@@ -33,7 +34,11 @@ class FaceChart {
 
   [[nodiscard]] const Spot& spot() const noexcept { return spot_; }
   [[nodiscard]] WalkForms forms(const Vec3& goal) const noexcept { return faces_.forms(place_, spot_, goal); }
-  [[nodiscard]] WalkStep sized(const WalkStep& step) const noexcept { return sized_at(spot_, step); }
+  void slope(const Vec3& goal, WalkForms& forms) const noexcept {
+    const Vec3 rest = spot_.point - goal;
+    forms.g_u = spot_.along_u.dot(rest);
+    forms.g_v = spot_.along_v.dot(rest);
+  }
   [[nodiscard]] double rest_length(bool first) const noexcept { return faces_.rest_length(first); }
   [[nodiscard]] double stride() const noexcept { return faces_.stride(); }
   [[nodiscard]] bool blocked(const WalkStep& step) const noexcept { return !admissible(place_, step); }
@@ -82,7 +87,8 @@ class FaceChart {
     return to;
   }
   bool evaluate(const Vec2& to, Spot& spot) noexcept {
-    spot = faces_.evaluate(place_.frame, to.x(), to.y());
+    // Made where it is to be: spots are large.
+    new (&spot) Spot(faces_.evaluate(place_.frame, to.x(), to.y()));
     return faces_.free(place_.frame, spot_, spot);
   }
   /// Something is in the way that no shorter step avoids.
@@ -95,11 +101,8 @@ class FaceChart {
   }
 
  private:
-  [[nodiscard]] static WalkStep sized_at(const Spot& spot, const WalkStep& step) noexcept {
-    return {step.u, step.v, (step.u * spot.along_u + step.v * spot.along_v).norm()};
-  }
   [[nodiscard]] WalkStep step_at(const Place& place, const Spot& spot, const Vec3& goal) const noexcept {
-    return sized_at(spot, newton_step(faces_.forms(place, spot, goal)));
+    return newton_step(faces_.forms(place, spot, goal));
   }
   [[nodiscard]] static bool admissible(const Place& place, const WalkStep& step) noexcept {
     for (int k = 0; k < 3; ++k) {
@@ -180,8 +183,8 @@ class FaceChart {
   Turn at_vertex(WalkStep& step, const Vec3& goal, bool may_leave, int corner, int& moves) noexcept {
     const TriangleMesh& mesh = faces_.mesh();
     const std::uint32_t vertex = mesh.triangles()[place_.frame.face][static_cast<std::size_t>(corner)];
-    Place best;
-    Spot best_spot;
+    Place best = place_;
+    Spot best_spot = spot_;
     WalkStep best_step;
     bool rim = false;
     for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {

@@ -84,7 +84,7 @@ concept SurfaceView = requires(const V& v, const Segment& motion, const Vec3& p,
   { v.nearest(p, 0.0, place) }
   noexcept->std::same_as<Foot>;
   { v.at(place, p) }
-  noexcept->std::same_as<typename V::Spot>;
+  noexcept->std::convertible_to<typename V::Spot>;
   { v.descend(place, spot, goal) }
   noexcept->std::same_as<DescentEnd>;
   { v.launch(place, spot, spot.point) }
@@ -96,6 +96,15 @@ concept SurfaceView = requires(const V& v, const Segment& motion, const Vec3& p,
   { v.has_folds() }
   noexcept->std::same_as<bool>;
 };
+
+/// Whether all of what draws a point on a surface to a goal lies within the friction cone. `normal` unit, away from the
+/// surface. [servo]
+inline bool within_cone(const Vec3& point, const Vec3& normal, const Vec3& goal, double coefficient) noexcept {
+  const Vec3 spring = point - goal;
+  const double push = spring.dot(normal);
+  if (!(push > 0.0) || coefficient <= 0.0) return point == goal;
+  return (spring - push * normal).norm() <= coefficient * push;
+}
 
 /// Where a point without friction would be led to so that it rests where friction stops it: the goal moved back along
 /// the pull's tangential part by what the cone holds, or the point itself while all of the pull lies within the cone.

@@ -28,15 +28,20 @@ struct WalkForms {
   double h_vv = 0.0;
 };
 
-/// Newton's step where the squared distance is convex, Gauss and Newton's where it is not. Length: not set. [servo]
+/// Newton's step where the squared distance is convex, Gauss and Newton's where it is not. [servo]
 inline WalkStep newton_step(const WalkForms& f) noexcept {
+  const auto solved = [&](double uu, double uv, double vv, double det) {
+    const double per = -1.0 / det;
+    const double u = per * (vv * f.g_u - uv * f.g_v);
+    const double v = per * (uu * f.g_v - uv * f.g_u);
+    return WalkStep{u, v, std::sqrt(std::max(0.0, u * (u * f.uu + 2.0 * v * f.uv) + v * v * f.vv))};
+  };
   const double det = f.uu * f.vv - f.uv * f.uv;
   const double newton_det = f.h_uu * f.h_vv - f.h_uv * f.h_uv;
   // Not convex, or nearly flat: its step would be no guide.
   constexpr double least_share = 0.02;
-  if (f.h_uu > 0.0 && newton_det > least_share * det)
-    return {-(f.h_vv * f.g_u - f.h_uv * f.g_v) / newton_det, -(f.h_uu * f.g_v - f.h_uv * f.g_u) / newton_det};
-  if (det > 0.0) return {-(f.vv * f.g_u - f.uv * f.g_v) / det, -(f.uu * f.g_v - f.uv * f.g_u) / det};
+  if (f.h_uu > 0.0 && newton_det > least_share * det) return solved(f.h_uu, f.h_uv, f.h_vv, newton_det);
+  if (det > 0.0) return solved(f.uu, f.uv, f.vv, det);
   return {};
 }
 
@@ -66,12 +71,13 @@ enum class Turn { go, rest, rim };
 /// ridge is crossed that the distance would have to rise over. With friction the goal is moved back by what the cone
 /// holds, anew at every step.
 ///
-/// A `Chart` is at one place and answers: spot(), the surface there; forms(goal) around it; sized(step), with its
-/// length; rest_length(first), below which a step is not made; blocked(step), whether it leads over a border that the
-/// place is on, and turn(step, goal, may_leave, moves), which then finds another one; reach(step, border), how much of
-/// a step lies within the chart, and what it ends at (-1: nothing); start(), the place; moved(start, step, share,
-/// border), the place there; evaluate(place, spot); take(place, spot), which goes there; stride(). Where flanks may
-/// meet (has_flanks): direction(step) in space, and towards(way), the step that leads along it. [servo]
+/// A `Chart` is at one place and answers: spot(), the surface there; forms(goal) around it;
+/// slope(goal, forms), where that is cheap, which brings their slope alone up to date; rest_length(first), below
+/// which a step is not made; blocked(step), whether it leads over a border that the place is on, and turn(step, goal,
+/// may_leave, moves), which then finds another one; reach(step, border), how much of a step lies within the chart, and
+/// what it ends at (-1: nothing); start(), the place; moved(start, step, share, border), the place there;
+/// evaluate(place, spot); take(place, spot), which goes there; stride(). Where flanks may meet (has_flanks):
+/// direction(step) in space, and towards(way), the step that leads along it. [servo]
 template <class Chart>
 class Walk {
  public:
@@ -81,9 +87,13 @@ class Walk {
     while (moves_ < walk_budget) {
       if (asked_.may_leave && leaves()) return DescentEnd::left;
       aim();
-      WalkStep step = chart_.sized(newton_step(chart_.forms(goal_)));
+      if (settled()) return DescentEnd::rest;
+      forms_ = chart_.forms(goal_);
+      formed_ = true;
+      WalkStep step = newton_step(forms_);
       if (step.length <= chart_.rest_length(moves_ == 0)) return DescentEnd::rest;
       if (chart_.blocked(step)) {
+        formed_ = false;
         const Turn turn = chart_.turn(step, goal_, asked_.may_leave, moves_);
         if (turn == Turn::rim) return DescentEnd::rim;
         if (turn == Turn::rest) return DescentEnd::rest;
@@ -101,10 +111,23 @@ class Walk {
     return side_ * chart_.spot().front.dot(asked_.point - chart_.spot().point) > 0.0;
   }
 
+  /// Whether the slope here is so small that a step by the last place's forms would be far below one worth making: what
+  /// a walk mostly ends with.
+  [[nodiscard]] bool settled() noexcept {
+    if constexpr (requires { chart_.slope(goal_, forms_); }) {
+      constexpr double far_below = 0.25;
+      // While the goal still moves there is a step to make.
+      if (!formed_ || moves_ == 0 || (asked_.friction > 0.0 && aims_ <= most_aims)) return false;
+      chart_.slope(goal_, forms_);
+      return newton_step(forms_).length <= far_below * chart_.rest_length(false);
+    } else {
+      return false;
+    }
+  }
+
   /// With friction the goal depends on the point: after two steps what is left of that is far below a thousandth of the
   /// force, and a goal that holds still is reached at Newton's pace.
   void aim() noexcept {
-    constexpr int most_aims = 2;
     if (asked_.friction <= 0.0) {
       goal_ = asked_.point;
     } else if (aims_++ < most_aims) {
@@ -118,7 +141,7 @@ class Walk {
     const double far = chart_.reach(step, border);
     const auto start = chart_.start();
     double distance = (chart_.spot().point - goal_).squaredNorm();
-    rejected_ = own_ = chart_.spot().front;
+    if (chart_.has_flanks()) rejected_ = own_ = chart_.spot().front;
     const auto attempt = [&](double share, int end) {
       const auto to = chart_.moved(start, step, share, end);
       ++moves_;
@@ -133,8 +156,9 @@ class Walk {
       chart_.take(to, there);
       return true;
     };
-    const double samples = std::ceil(far * step.length / chart_.stride());
-    const int count = static_cast<int>(std::clamp(samples, 1.0, static_cast<double>(walk_budget)));
+    const double strides = far * step.length / chart_.stride();
+    // Mostly one; rounding up costs something.
+    const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * walk_budget)) : 1;
     bool any = false;
     for (int i = 1; i <= count; ++i) {
       if (!attempt(far * i / count, i == count ? border : -1)) break;
@@ -161,6 +185,7 @@ class Walk {
     return false;
   }
 
+  static constexpr int most_aims = 2;
   // Flanks that turn by less are one (rad).
   static constexpr double least_fold = 1e-3;
 
@@ -185,7 +210,8 @@ class Walk {
     if (!(sine > least_fold)) return false;
     const Vec3 direction = fold / sine;
     const double size = -direction.dot(chart_.spot().point - goal_);
-    const WalkStep step = chart_.sized(chart_.towards(size * direction));
+    WalkStep step = chart_.towards(size * direction);
+    step.length = chart_.direction(step).norm();
     return step.length > chart_.rest_length(false) && !chart_.blocked(step) && advance(step);
   }
 
@@ -193,6 +219,8 @@ class Walk {
   const Goal& asked_;
   double side_;
   Vec3 goal_ = Vec3::Zero();
+  WalkForms forms_;               ///< of the last place
+  bool formed_ = false;           ///< they are known, and of this chart
   Vec3 own_ = Vec3::Zero();       ///< front at the start of a step
   Vec3 rejected_ = Vec3::Zero();  ///< of a place that was no nearer
   Vec3 rejected_point_ = Vec3::Zero();

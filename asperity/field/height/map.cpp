@@ -241,9 +241,7 @@ Vec2 HeightMap::central_slope(const Vec2& st) const noexcept {
           (height_at(st + dt) - height_at(st - dt)) * 0.5 * height_};
 }
 
-HeightCurvature HeightMap::curvature(const Vec2& st) const noexcept {
-  if (reconstruction_ == Reconstruction::quadratic_bspline) [[likely]]
-    return curvature_bspline(st);
+HeightCurvature HeightMap::curvature_bilinear(const Vec2& st) const noexcept {
   const HeightSample sample = this->sample(st);
   HeightCurvature curvature{sample.height, sample.gradient, 0.0, 0.0, 0.0};
   if (reconstruction_ == Reconstruction::bilinear) {

@@ -105,7 +105,9 @@ class HeightMap {
   /// the lines where its pieces meet. In a piece of the spline, a texel, `ss` is constant along s, `tt` along t and
   /// `st` linear along both; bilinear has `st` alone, nearest none. Outside, along a clamped axis, its own are 0.
   /// [servo]
-  [[nodiscard]] HeightCurvature curvature(const Vec2& st) const noexcept;
+  [[nodiscard]] HeightCurvature curvature(const Vec2& st) const noexcept {
+    return reconstruction_ == Reconstruction::quadratic_bspline ? curvature_bspline(st) : curvature_bilinear(st);
+  }
   /// Bounds of the height (m) over the closed rectangle between two opposite corners, which may lie outside 0 to 1; no
   /// sample in it leaves them, by rounding either. On up to 6 x 6 texels they exceed the true range by a term of second
   /// order in a texel (spline) or by rounding alone. On more they lie within the range over the rectangle grown on
@@ -147,6 +149,8 @@ class HeightMap {
   /// Stores offset + scale * source as the reconstruction needs it.
   void store(const std::vector<float>& source, double offset, double scale);
   [[nodiscard]] HeightCurvature curvature_bspline(const Vec2& st) const noexcept;
+  /// Or of the nearest texel, which has none.
+  [[nodiscard]] HeightCurvature curvature_bilinear(const Vec2& st) const noexcept;
   [[nodiscard]] StoredTexels stored() const noexcept { return {values_.data(), width_, height_, reconstruction_}; }
 
   // Rows run with t (bottom row first) inside an apron of one texel, which holds what repeat or clamp would answer:

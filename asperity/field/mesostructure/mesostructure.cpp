@@ -164,7 +164,7 @@ Mesostructure::BetweenMaps Mesostructure::maps_at(double level) const noexcept {
           felt - below};
 }
 
-HeightCurvature Mesostructure::curvature(const Vec2& st, double level) const noexcept {
+HeightCurvature Mesostructure::mixed_curvature(const Vec2& st, double level) const noexcept {
   const auto [lower, higher, part] = maps_at(level);
   HeightCurvature mixed = lower->curvature(st);
   if (part <= 0.0) return mixed;

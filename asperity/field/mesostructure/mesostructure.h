@@ -39,7 +39,9 @@ class Mesostructure {
   [[nodiscard]] MesostructureSample sample(const Vec2& st) const noexcept;
   /// Height with its derivatives at a level of detail: 0 the map itself, between two levels mixed. Without a pyramid
   /// every level is 0. [servo]
-  [[nodiscard]] HeightCurvature curvature(const Vec2& st, double level) const noexcept;
+  [[nodiscard]] HeightCurvature curvature(const Vec2& st, double level) const noexcept {
+    return level <= 0.0 || detail_ == nullptr ? heights_.curvature(st) : mixed_curvature(st, level);
+  }
   /// Bounds of that height over a rectangle, as HeightMap::range_over. [servo]
   [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
   /// The same mesostructure with levels of detail. [build]
@@ -58,6 +60,7 @@ class Mesostructure {
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
+  [[nodiscard]] HeightCurvature mixed_curvature(const Vec2& st, double level) const noexcept;
   Mesostructure(HeightMap heights, std::optional<NormalMap> normals, const Vec2& tile);
 
   /// The two maps that a level lies between, and the part of the way from the first to the second.

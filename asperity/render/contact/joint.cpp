@@ -20,6 +20,13 @@ constexpr double rest_of_skin_beside_smooth = 0.05;
 // A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
 constexpr double point_of_grain = 1e-3;
 
+/// Whether one of the same surface with the same direction is there already.
+bool stands_among(const ConstraintPlane& plane, const PlaneSet& planes) noexcept {
+  return std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& other) {
+    return other.owner == plane.owner && other.normal == plane.normal;
+  });
+}
+
 }  // namespace
 
 void JointSolve::add(Touched& touch) noexcept {
@@ -60,24 +67,20 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
   const Vec3 local = touch.pose->apply_inverse(position);
   // How far beyond touching a tangent plane is worth knowing.
   const double reach = radius_ + gap(entry) + (entry.folds ? 2.0 * entry.skin : 0.05 * entry.grain);
-  bool from_behind = false;
+  // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
+  // reached has no direction of its own, the surface's is taken.
+  Vec3 way = Vec3::Zero();
   const Foot foot = on_smooth_view(touch.view, [&](const auto& view) {
     const Foot found = view.nearest(local, reach, entry.near);
     if (!found.found()) return found;
-    entry.near = {found.element, false, found.at};
-    const Vec3 front = view.front(found);
-    const Vec3 way = found.distance > entry.direct ? Vec3((local - found.point) / found.distance) : found.normal;
-    from_behind = way.dot(front) < 0.0;
-    entry.near.back = from_behind;
+    way = found.distance > entry.direct ? Vec3((local - found.point) / found.distance) : found.normal;
+    entry.near = {found.element, way.dot(view.front(found)) < 0.0, found.at};
     return found;
   });
-  if (!foot.found() || (from_behind && touch.facts->sides == Sides::front)) return false;
-  // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
-  // reached has no direction of its own, the surface's is taken.
-  Vec3 normal = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
-  normal = touch.pose->rotate(normal);
-  const Vec3 point = touch.pose->apply(foot.point);
-  plane = {normal, normal.dot(point) + radius_, gap(entry), static_cast<std::uint32_t>(index), foot};
+  if (!foot.found() || (entry.near.back && touch.facts->sides == Sides::front)) return false;
+  const Vec3 normal = touch.pose->rotate(way);
+  plane = {normal, normal.dot(touch.pose->apply(foot.point)) + radius_, gap(entry), static_cast<std::uint32_t>(index),
+           foot};
   return true;
 }
 
@@ -99,10 +102,11 @@ double JointSolve::distance_to_foot(const ConstraintPlane& plane, const Vec3& po
   return (position - entries_[plane.owner].touch->to_world(plane.contact.point)).norm();
 }
 
-ConstraintPlane JointSolve::plane_of(const Entry& entry, const Foot& contact) const noexcept {
+ConstraintPlane JointSolve::plane_of(std::size_t index, const Foot& contact) const noexcept {
+  const Entry& entry = entries_[index];
   const Vec3 normal = entry.touch->turned(contact.normal);
   return {normal, normal.dot(entry.touch->to_world(contact.point)) + radius_, gap(entry),
-          static_cast<std::uint32_t>(&entry - entries_.begin()), contact};
+          static_cast<std::uint32_t>(index), contact};
 }
 
 /// What of its triangles the ball touches.
@@ -116,7 +120,7 @@ void JointSolve::triangle_planes(std::size_t index, const Vec3& position, PlaneS
   } else {
     std::get_if<TriangleView>(&touch.view)->contacts(local, radius_ + margin_, touch.facts->sides, contacts);
   }
-  for (const Foot& contact : contacts) out.push_back(plane_of(entry, contact));
+  for (const Foot& contact : contacts) out.push_back(plane_of(index, contact));
 }
 
 void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
@@ -134,10 +138,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
   for (std::size_t i = feet_.size(); i-- > 0;) {
     const ConstraintPlane& plane = feet_[i];
-    bool known = false;
-    for (const ConstraintPlane& other : out)
-      known = known || (other.owner == plane.owner && other.normal == plane.normal);
-    if (known) continue;
+    if (stands_among(plane, out)) continue;
     // Feet found on the way stay about as long as their surface bends.
     const double around = radius_ + plane.skin;
     if (plane.normal.dot(position) - plane.offset - plane.skin <= 0.1 * around + stride_ &&
@@ -177,7 +178,8 @@ double JointSolve::free_share(const Segment& motion) noexcept {
   double share = 1.0;
   const double length = (motion.to - motion.from).norm();
   if (length == 0.0) return share;
-  for (Entry& entry : entries_) {
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
     const Touched& touch = *entry.touch;
     const Sides sides = touch.facts->sides;
     const Segment local = touch.to_local(motion);
@@ -187,7 +189,7 @@ double JointSolve::free_share(const Segment& motion) noexcept {
       const SweptHit hit = std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin_, sides);
       share = std::min(share, hit.t);
       // What stops it may be farther off than what counts as touched.
-      if (smooth_ && hit.hit && hit.t < 1.0) remember(plane_of(entry, hit.contact));
+      if (smooth_ && hit.hit && hit.t < 1.0) remember(plane_of(i, hit.contact));
     } else {
       const SweptHit hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
       // The centre itself must stay outside: half of the ball before what it meets.
@@ -220,8 +222,12 @@ bool JointSolve::push_out(Vec3& position) noexcept {
     position += share * (out - position);
     // Between walls it is led along all of them.
     if (share < 1.0) {
+      PlaneSet walls;
       for (std::size_t i = 0; i < entries_.size(); ++i) {
-        if (!entries_[i].smooth) triangle_planes(i, position, held);
+        if (!entries_[i].smooth) triangle_planes(i, position, walls);
+      }
+      for (const ConstraintPlane& wall : walls) {
+        if (!stands_among(wall, held)) held.push_back(wall);
       }
     }
   }
@@ -259,79 +265,98 @@ bool JointSolve::loosen(const Vec3& position) noexcept {
   return feet_.size() < before;
 }
 
-ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcept {
+/// On triangles alone: from one set of planes to the next.
+void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept {
   // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
   // either side is left before the other is felt; and a ball right above the edge it rolls over may stop, or roll in
   // larger steps.
+  constexpr int most_moves = 64;
   constexpr int patience = 8;
   constexpr double least_gain = 1e-6;
-  const int most_moves = smooth_ ? 160 : 64;
-  tolerance_ = infinity;
-  for (const Entry& entry : entries_) {
-    if (!smooth_) {
-      tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);
-      continue;
-    }
-    const double rest = entry.smooth ? (entry.folds ? rest_of_grain : rest_of_smooth_grain) * entry.grain
-                                     : rest_of_skin_beside_smooth * entry.skin;
-    tolerance_ = tolerance_ == infinity ? rest : std::max(tolerance_, rest);
-  }
-  ConstraintSolution solution;
-  solution.proxy = from;
   PlaneSet earlier;
+  PlaneSet& planes = solution.planes;
   double distance = infinity;
   double stride = 1.0;
-  Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
   for (int move = 0; move < most_moves; ++move) {
-    const bool patient = !smooth_ && move >= patience;
-    if (patient) earlier = solution.planes;
-    solution.planes.clear();
-    touched(solution.proxy, solution.planes);
-    const bool single = solution.planes.size() == 1;
-    const bool rolling = !smooth_ && move > 0 && single && rolls(solution.planes[0]);
-    Vec3 target = single && !smooth_ ? onto_plane(goal, solution.planes[0])
-                                     : project_onto_planes(goal, solution.planes, true).point;
-    const Vec3 foot =
-        rolling ? entries_[solution.planes[0].owner].touch->to_world(solution.planes[0].contact.point) : goal;
-    if (rolling) target = rolling_target(solution.planes[0], foot, goal, target);
+    const bool patient = move >= patience;
+    if (patient) earlier = planes;
+    planes.clear();
+    touched(solution.proxy, planes);
+    const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
+    Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
+    const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
+    if (rolling) target = rolling_target(planes[0], foot, goal, target);
     Vec3 step = target - solution.proxy;
     if (step.norm() <= tolerance_) {
-      if (smooth_ && loosen(solution.proxy)) continue;
       // Without contact nothing may remain between proxy and probe: free space gives no force at all.
-      if (solution.planes.empty()) solution.proxy = target;
+      if (planes.empty()) solution.proxy = target;
       solution.converged = true;
-      break;
-    }
-    if (smooth_) {
-      stride_ = step.norm();
-      if (advance(step, goal, solution.proxy)) {
-        refused = Vec3::Constant(infinity);
-        continue;
-      }
-      // No motion comes nearer: a local minimum, found by trying, if all that holds it there is known and is there.
-      const bool again = (target - refused).norm() > tolerance_ && (met_ || loosen(solution.proxy));
-      refused = target;
-      if (again) continue;
-      solution.converged = true;
-      break;
+      return;
     }
     if (rolling && patient) {
-      if ((goal - foot).dot(solution.planes[0].normal) < 0.0) {
+      if ((goal - foot).dot(planes[0].normal) < 0.0) {
         // The edge is between ball and goal: the ball rolls off it, slowly at first.
         stride *= 2.0;
         step *= std::min(stride, 0.2 * (solution.proxy - foot).norm() / step.norm());
       } else {
         const double now = (solution.proxy - goal).norm();
         solution.converged = std::exchange(distance, now) - now < least_gain * now;
-        if (solution.converged) break;
+        if (solution.converged) return;
       }
     } else if (patient && move % 4 == 0) {
-      PlaneSet both = solution.planes;
+      PlaneSet both = planes;
       for (const ConstraintPlane& plane : earlier) both.push_back(plane);
       step = project_onto_planes(goal, both, true).point - solution.proxy;
     }
     const double t = free_share({solution.proxy, solution.proxy + step});
     solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
+  }
+}
+
+/// Among surfaces of which some are smooth: only ever nearer to the goal.
+void JointSolve::settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept {
+  constexpr int most_moves = 160;
+  Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
+  for (int move = 0; move < most_moves; ++move) {
+    solution.planes.clear();
+    touched(solution.proxy, solution.planes);
+    const Vec3 target = project_onto_planes(goal, solution.planes, true).point;
+    const Vec3 step = target - solution.proxy;
+    if (step.norm() <= tolerance_) {
+      if (loosen(solution.proxy)) continue;
+      if (solution.planes.empty()) solution.proxy = target;
+      solution.converged = true;
+      return;
+    }
+    stride_ = step.norm();
+    if (advance(step, goal, solution.proxy)) {
+      refused = Vec3::Constant(infinity);
+      continue;
+    }
+    // No motion comes nearer: a local minimum, found by trying, if all that holds it there is known and is there.
+    const bool again = (target - refused).norm() > tolerance_ && (met_ || loosen(solution.proxy));
+    refused = target;
+    if (again) continue;
+    solution.converged = true;
+    return;
+  }
+}
+
+ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcept {
+  ConstraintSolution solution;
+  solution.proxy = from;
+  if (smooth_) {
+    tolerance_ = 0.0;
+    for (const Entry& entry : entries_) {
+      const double rest = entry.smooth ? (entry.folds ? rest_of_grain : rest_of_smooth_grain) * entry.grain
+                                       : rest_of_skin_beside_smooth * entry.skin;
+      tolerance_ = std::max(tolerance_, rest);
+    }
+    settle_among_smooth(goal, solution);
+  } else {
+    tolerance_ = infinity;
+    for (const Entry& entry : entries_) tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);
+    settle_on_triangles(goal, solution);
   }
   solution.projection = project_onto_planes(goal, solution.planes, false);
   // Planes that would have it elsewhere are not all that holds it.

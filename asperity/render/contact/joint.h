@@ -57,11 +57,13 @@ class JointSolve {
   [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin_ + entry.skin; }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
-  [[nodiscard]] ConstraintPlane plane_of(const Entry& entry, const Foot& contact) const noexcept;
+  [[nodiscard]] ConstraintPlane plane_of(std::size_t index, const Foot& contact) const noexcept;
   void triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
   [[nodiscard]] double free_share_of_ball(Entry& entry, const Segment& motion) noexcept;
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
+  void settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept;
+  void settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void share_out(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
@@ -132,11 +134,12 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
       landed = true;
       continue;
     }
-    const bool slipped = slips(hold.friction, proxy, hold.normal, probe, sliding, [&] {
+    bool slipped = !holds(hold.friction, proxy, hold.normal, probe, sliding);
+    if (slipped) {
       goal = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
       solution = solve(proxy, goal);
-      return solution.proxy;
-    });
+      slipped = no_farther(solution.proxy, proxy, probe);
+    }
     if (!slipped) {
       sliding = sliding || (slid && !landed);
       // The spring's force is its own, whatever its direction: what the planes hold is the push, the rest is

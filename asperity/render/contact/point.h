@@ -115,7 +115,7 @@ class PointProxy {
 
   /// From one fold to another that overlaps it in space, and back: along the crease between them each change must come
   /// nearer.
-  DescentEnd settle_over_folds() noexcept {
+  [[gnu::noinline]] DescentEnd settle_over_folds() noexcept {
     constexpr int most_folds = 16;
     constexpr double least_gain = 1e-9;
     for (int fold = 0; fold < most_folds; ++fold) {
@@ -140,16 +140,13 @@ class PointProxy {
     if (friction_.still <= 0.0) return slide(0.0);
     const Vec3 normal_before = normal();
     if ((probe_ - spot_.point).dot(normal_before) > 0.0) return DescentEnd::left;
+    if (holds(friction_, spot_.point, normal_before, probe_, state_.sliding)) return DescentEnd::rest;
     const Place place = place_;
-    const Spot spot = spot_;
-    DescentEnd end = DescentEnd::rest;
-    const bool slipped = slips(friction_, spot.point, normal_before, probe_, state_.sliding, [&] {
-      end = slide(friction_.sliding);
-      return spot_.point;
-    });
-    if (slipped) return end;
+    const Vec3 at = spot_.point;
+    const DescentEnd end = slide(friction_.sliding);
+    if (no_farther(spot_.point, at, probe_)) return end;
     place_ = place;
-    spot_ = spot;
+    spot_ = view_.at(place_, normal_before);
     return DescentEnd::rest;
   }
 

@@ -27,9 +27,13 @@ void add_contact(Tick& tick, const Touched& touch, const LawForce& law) noexcept
   const double size = law.force.norm();
   if (size <= tick.strongest) return;
   tick.strongest = size;
-  const std::uint32_t count = out.contact.count;
-  out.contact = {count,      touch.contact->instance, law.element, law.point,
-                 law.normal, law.penetration,         law.height,  touch.contact->surface.places};
+  out.contact.instance = touch.contact->instance;
+  out.contact.element = law.element;
+  out.contact.point = law.point;
+  out.contact.normal = law.normal;
+  out.contact.penetration = law.penetration;
+  out.contact.height = law.height;
+  out.contact.places = touch.contact->surface.places;
 }
 
 /// What the law of an instance without a proxy answers, object frame. `material`: felt at the probe.
@@ -88,20 +92,20 @@ LawForce ask(const Touched& touch, const Material& material, const Vec3& probe, 
 
 /// Velocity of the probe over a moving instance (m/s, world).
 Vec3 velocity_over(const Tick& tick, const Touched& touch) noexcept {
-  const Vec3& velocity = tick.probe.twist.linear;
+  const Vec3& velocity = tick.probe->twist.linear;
   if (!touch.instance->motion.moves()) return velocity;
-  return velocity - touch.instance->motion.velocity_at(*touch.pose, tick.probe.pose.position, tick.probe.time);
+  return velocity - touch.instance->motion.velocity_at(*touch.pose, tick.probe->pose.position, tick.probe->time);
 }
 
 /// The probe's motion as an instance sees it.
 FineMotion motion_over(const Tick& tick, const Touched& touch) noexcept {
-  const Vec3& position = tick.probe.pose.position;
+  const Vec3& position = tick.probe->pose.position;
   const Vec3& previous = tick.state.previous_probe;
   if (touch.instance->motion.moves()) {
     return {touch.pose->apply_inverse(position) - touch.before->apply_inverse(previous),
             touch.pose->rotate_inverse(velocity_over(tick, touch)), tick.dt};
   }
-  return {touch.turned_back(position - previous), touch.turned_back(tick.probe.twist.linear), tick.dt};
+  return {touch.turned_back(position - previous), touch.turned_back(tick.probe->twist.linear), tick.dt};
 }
 
 /// A law's answer and its parts, turned into the world frame.
@@ -180,7 +184,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   Contact& contact = *touch.contact;
   const FineMotion motion = motion_over(tick, touch);
   const bool volume = touch.facts->volume;
-  const Vec3 position = touch.to_local(tick.probe.pose.position);
+  const Vec3 position = touch.to_local(tick.probe->pose.position);
   const Vec3 previous = touch.pose->apply_inverse(tick.state.previous_probe);
   // The contact point's laws look the material up where that is.
   const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
@@ -199,7 +203,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
       law.push = law.force.dot(law.normal);
       // Against the hand's own motion: damping by a surface that moves would drag the hand along.
       law.force =
-          with_damping(law.force, law.normal, touch.pose->rotate_inverse(tick.probe.twist.linear), material.damping);
+          with_damping(law.force, law.normal, touch.pose->rotate_inverse(tick.probe->twist.linear), material.damping);
     }
   }
   const bool adds = touch.facts->adds_friction;
@@ -210,7 +214,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   }
   to_world(touch, law);
   add_viscosity(material.viscosity, velocity_over(tick, touch), law);
-  limit_drag(tick, touch, tick.probe.pose.position, law);
+  limit_drag(tick, touch, tick.probe->pose.position, law);
   add_contact(tick, touch, law);
   if (law.contact) shadow = law.point;
 }
@@ -221,10 +225,10 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   Touched& touch = *part.touch;
   const Instance& instance = *touch.instance;
   const bool adds = touch.facts->adds_friction;
-  std::optional<Material> mapped;
-  if (touch.facts->varies && relief_of(instance) != nullptr)
-    mapped = local_material(touch, touch.pose->apply_inverse(law.point));
-  const Material& local = mapped ? *mapped : instance.material;
+  const bool mapped = touch.facts->varies && !touch.facts->volume;
+  MaterialRoom room;
+  const Material& local =
+      mapped ? material_there(touch, touch.pose->apply_inverse(law.point), room) : instance.material;
   if (local.viscosity > 0.0) add_viscosity(local.viscosity, velocity_over(tick, touch), law);
   if (!adds && instance.fine == nullptr) {
     limit_drag(tick, touch, law.point, law);
@@ -263,7 +267,7 @@ void add_attraction(Tick& tick, Touched& touch) noexcept {
     contact.debt += std::max(0.0, now - contact.attraction);
   }
   contact.debt -= tick.state.tank.pay(contact.debt);
-  const Attraction pull = attraction_at(touch, touch.pose->apply_inverse(tick.probe.pose.position));
+  const Attraction pull = attraction_at(touch, touch.pose->apply_inverse(tick.probe->pose.position));
   contact.attraction = pull.potential;
   if (contact.debt > 0.0 || pull.force.isZero(0.0)) return;
   tick.out.wrench.force += touch.pose->rotate(pull.force);
@@ -275,7 +279,7 @@ void add_effects(Tick& tick) noexcept {
   for (const FieldEffect& effect : tick.scene.felt_effects()) {
     CellPolynomial cache;
     const int here = std::min(tick.level, effect.field->levels() - 1);
-    const Vec3 force = field_effect_force(effect, here, tick.probe.pose.position, tick.probe.twist.linear, cache);
+    const Vec3 force = field_effect_force(effect, here, tick.probe->pose.position, tick.probe->twist.linear, cache);
     if (force.isZero()) continue;
     tick.out.flags.set(TickFlag::field_force);
     tick.out.wrench.force += force;
@@ -298,7 +302,7 @@ void add(Tick& tick) noexcept {
   for (Touched& touch : tick.touches) {
     if (touch.facts->draws) add_attraction(tick, touch);
   }
-  add_effects(tick);
+  if (!tick.scene.felt_effects().empty()) add_effects(tick);
 }
 
 }  // namespace asperity

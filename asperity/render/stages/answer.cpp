@@ -10,9 +10,9 @@ namespace {
 Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
   ProxyState& state = tick.state;
   const bool new_scene = tick.changed && !tick.first;
-  if (!new_scene && state.residual.isZero(0.0)) return force;
+  if (!new_scene && state.residual == Vec3::Zero()) return force;
   const double time = tick.scene.settings().handover.count();
-  const Vec3 moved = tick.probe.pose.position - state.previous_probe;
+  const Vec3 moved = tick.probe->pose.position - state.previous_probe;
   // What the last tick's share of the old force has given since.
   state.tank.pay(state.residual.dot(moved));
   if (new_scene) state.residual = time > 0.0 ? Vec3(state.force - force) : Vec3(Vec3::Zero());
@@ -46,12 +46,12 @@ void answer(Tick& tick) noexcept {
   ProxyState& state = tick.state;
   ForceSample& out = tick.out;
   out.wrench.force = handed_over(tick, out.wrench.force);
-  out.flags.set(TickFlag::not_converged, !tick.converged);
-  out.flags.set(TickFlag::energy_limited, tick.limited);
-  remember_sides(tick);
+  if (!tick.converged) out.flags.set(TickFlag::not_converged);
+  if (tick.limited) out.flags.set(TickFlag::energy_limited);
+  if (tick.scene.changes()) remember_sides(tick);
   state.force = out.wrench.force;
-  state.previous_probe = tick.probe.pose.position;
-  state.previous_time = tick.probe.time;
+  state.previous_probe = tick.probe->pose.position;
+  state.previous_time = tick.probe->time;
   state.workspace_probe = tick.workspace.pose.position;
   if (!tick.direct) to_hand(tick.scene.settings().view, out);
 }

@@ -37,7 +37,7 @@ double wanted_level(const Tick& tick, const Touched& touch, const ReliefSurface&
   } else {
     // Eight samples a wavelength (formulation, D5).
     constexpr double samples = 8.0;
-    scale = samples * tick.probe.twist.linear.norm() * tick.dt.count();
+    scale = samples * tick.probe->twist.linear.norm() * tick.dt.count();
   }
   const double pixel = settings.view.pixel_at(tick.state.proxy);
   // Two pixels show a wavelength, one shows a height.
@@ -48,12 +48,10 @@ double wanted_level(const Tick& tick, const Touched& touch, const ReliefSurface&
 /// Which of its coat's states a contact feels.
 void choose_moment(const Tick& tick, Touched& touch) noexcept {
   const ReliefSurface* relief = relief_of(*touch.instance);
-  if (relief == nullptr || !feels_moment(touch.instance->law)) return;
-  Contact& contact = *touch.contact;
   const Coat& coat = relief->coat();
-  if (!coat.moves() && coat.levels() == 0) return;
+  Contact& contact = *touch.contact;
   const CoatMoment last{contact.detail_level.value_or(0.0), coat.moves() ? tick.state.previous_time.count() : 0.0};
-  if (coat.moves()) touch.moment.time = tick.probe.time.count();
+  if (coat.moves()) touch.moment.time = tick.probe->time.count();
   if (coat.levels() > 0) {
     const double wanted = wanted_level(tick, touch, *relief, last);
     const double most = tick.scene.settings().level_rate * tick.dt.count();
@@ -180,10 +178,10 @@ bool place_instances(Tick& tick) noexcept {
     const Instance& instance = *touch.instance;
     Contact& contact = *touch.contact;
     // What stood still at the last tick, and cannot move by itself, stands where it did.
-    const bool stands = !tick.changed && !contact.moved && contact.placed && !instance.motion.moves();
+    const bool stands = !tick.changed && !contact.moved && contact.placed && !touch.facts->moves;
     touch.pose = touch.before = &contact.pose;
     if (!stands) {
-      const Pose now = instance.motion.at(instance.world_from_object, tick.probe.time);
+      const Pose now = instance.motion.at(instance.world_from_object, tick.probe->time);
       Pose* before = tick.earlier.emplace_back();
       *before = contact.placed ? contact.pose : now;
       touch.before = before;
@@ -191,8 +189,8 @@ bool place_instances(Tick& tick) noexcept {
       contact.placed = true;
       touch.moved = !same_pose(now, *before);
     }
-    touch.at_origin = touch.pose->is_identity();
-    if (relief_of(instance) != nullptr) choose_moment(tick, touch);
+    touch.at_origin = touch.facts->at_origin || (touch.facts->moves && touch.pose->is_identity());
+    if (touch.facts->moment) choose_moment(tick, touch);
     contact.moved = touch.moved;
     any = any || touch.moved;
   }
@@ -286,13 +284,10 @@ void carry(Tick& tick) noexcept {
 void remember_sides(Tick& tick) noexcept {
   for (Touched& touch : tick.touches) {
     Contact& contact = *touch.contact;
-    if (!touch.facts->constrains || !touch.facts->changes) {
-      contact.outside.reset();
-      continue;
-    }
+    if (!touch.facts->changes) continue;
     // A proxy that is held rests a skin above the side that it is held on.
     contact.outside =
-        in_front(touch, touch.pose->apply_inverse(contact.touching ? tick.state.proxy : tick.probe.pose.position));
+        in_front(touch, touch.pose->apply_inverse(contact.touching ? tick.state.proxy : tick.probe->pose.position));
   }
 }
 

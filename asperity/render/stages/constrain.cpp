@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <optional>
 
 #include "asperity/render/contact/fine.h"
 #include "asperity/render/contact/joint.h"
@@ -17,11 +16,6 @@ Friction friction_of(const Touched& touch, const Material& material) noexcept {
   const double grip = material.stickiness / material.stiffness;
   if (!touch.facts->holds_friction) return {0.0, 0.0, grip};
   return {std::max(material.static_friction, material.dynamic_friction), material.dynamic_friction, grip};
-}
-
-/// What an instance is made of at a place (object frame): `room` holds it where that may differ from place to place.
-const Material& material_there(const Touched& touch, const Vec3& place, std::optional<Material>& room) noexcept {
-  return touch.facts->varies ? room.emplace(local_material(touch, place)) : touch.instance->material;
 }
 
 /// A sliding contact's force lies on the cone to within what the descent left; here exactly.
@@ -58,12 +52,12 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   constexpr bool triangles = std::is_same_v<View, TriangleView>;
   const Instance& instance = *touch.instance;
   OfSurface& surface = touch.contact->surface;
-  const Vec3& position = tick.probe.pose.position;
+  const Vec3& position = tick.probe->pose.position;
   const double radius = tick.scene.probe_radius();
   const Vec3 from = touch.to_local(tick.state.proxy);
   // Friction is that of the place where the proxy rests.
   const Vec3& place = surface.rests && touch.facts->volume ? surface.places[0].at : from;
-  std::optional<Material> room;
+  MaterialRoom room;
   const Friction friction = friction_of(touch, material_there(touch, place, room));
   const bool rested = surface.rests;
   const bool slid = surface.sliding;
@@ -75,11 +69,13 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
     return false;
   }
   tick.converged = rest.converged;
-  tick.felt = tick.state.proxy = position;
   Part& part = *tick.parts.emplace_back();
   part.touch = &touch;
   part.stiffness = instance.material.stiffness;
-  if (!rest.contact) return true;
+  if (!rest.contact) {
+    tick.felt = tick.state.proxy = position;
+    return true;
+  }
   const Vec3 foot = rest.proxy - radius * rest.normal;
   const Material& material = material_there(touch, foot, room);
   part.stiffness = material.stiffness;
@@ -112,7 +108,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   if constexpr (std::is_same_v<View, ReliefView>) surface.height = point.place().side() * view.surface().base().skin();
   if (!rest.pulls) {
     law.force = with_damping(on_cone(law.force, law.normal, friction, surface.sliding), law.normal,
-                             tick.probe.twist.linear, material.damping);
+                             tick.probe->twist.linear, material.damping);
   }
   if (std::holds_alternative<ForceShadingLaw>(instance.law))
     add_turn(touch.contact->memory<ShadingMemory>(), law, position - tick.state.previous_probe);
@@ -133,7 +129,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
 /// Several surfaces, triangles, or a ball.
 void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   ProxyState& state = tick.state;
-  const Vec3& position = tick.probe.pose.position;
+  const Vec3& position = tick.probe->pose.position;
   JointSolve joint(tick.scene.probe_radius(), patches);
   const Vec3 before = state.proxy;
   Vec3 from = before;
@@ -155,7 +151,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   if (smooth && tick.surfaces_moved) static_cast<void>(joint.push_out(from));
   const auto friction_in = [&](std::uint32_t owner) {
     const Touched& touch = joint.touch(owner);
-    std::optional<Material> room;
+    MaterialRoom room;
     return friction_of(touch, material_there(touch, touch.to_local(before), room));
   };
   Vec3 goal = position;
@@ -172,10 +168,10 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   tick.felt = solution.settled() ? Vec3(solution.projection.point) : solution.proxy;
   for (std::size_t i = 0; i < joint.size(); ++i) {
     Touched& touch = joint.touch(i);
-    std::optional<Material> room;
+    MaterialRoom room;
     const Material& material = material_there(touch, touch.to_local(solution.proxy), room);
     Part& part = *tick.parts.emplace_back();
-    part = {&touch, owner_force(touch, material, i, solution, goal, tick.probe), material.stiffness};
+    part = {&touch, owner_force(touch, material, i, solution, goal, *tick.probe), material.stiffness};
     if (std::holds_alternative<ForceShadingLaw>(touch.instance->law))
       add_turn(touch.contact->memory<ShadingMemory>(), part.law, position - state.previous_probe);
     joint.remember_places(i, solution);
@@ -196,7 +192,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
 /// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
 void limit_energy(Tick& tick) noexcept {
   ProxyState& state = tick.state;
-  const Vec3& probe = tick.probe.pose.position;
+  const Vec3& probe = tick.probe->pose.position;
   double stiffness = 0.0;
   double strongest = 0.0;
   for (const Part& part : tick.parts) {
@@ -238,7 +234,7 @@ void constrain(Tick& tick) noexcept {
     facets = facets || touch.facts->facets;
   }
   if (count == 0) {
-    tick.state.proxy = tick.felt = tick.probe.pose.position;
+    tick.state.proxy = tick.felt = tick.probe->pose.position;
     tick.state.stiffness = 0.0;
     return;
   }

@@ -1,5 +1,3 @@
-#include <cmath>
-
 #include "asperity/render/stages/tick.h"
 
 namespace asperity {
@@ -91,18 +89,6 @@ bool adopt(Contact& contact, const Instance& instance) noexcept {
 
 }  // namespace
 
-bool is_place(const ProbeSample& probe) noexcept {
-  // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
-  constexpr double farthest = 1e6;
-  const Vec3& place = probe.pose.position;
-  if (!(std::abs(place.x()) < farthest && std::abs(place.y()) < farthest && std::abs(place.z()) < farthest))
-    return false;
-  // 0 times a number is 0; times an infinity or no number it is none.
-  return (0.0 * probe.pose.orientation.coeffs()).sum() + (0.0 * probe.twist.linear).sum() +
-             (0.0 * probe.twist.angular).sum() + 0.0 * probe.time.count() ==
-         0.0;
-}
-
 bool sample(Tick& tick) noexcept {
   ProxyState& state = tick.state;
   if (!is_place(tick.workspace)) {
@@ -111,11 +97,15 @@ bool sample(Tick& tick) noexcept {
     return false;
   }
   const View& view = tick.scene.settings().view;
-  tick.direct = view.identity();
-  tick.probe = tick.direct ? tick.workspace : in_scene(view, tick.workspace);
+  tick.direct = tick.scene.direct();
+  if (!tick.direct) {
+    ProbeSample* probe = tick.in_scene.emplace_back();
+    *probe = in_scene(view, tick.workspace);
+    tick.probe = probe;
+  }
   tick.first = state.epoch == 0;
   if (tick.first) {
-    state.proxy = state.previous_probe = tick.probe.pose.position;
+    state.proxy = state.previous_probe = tick.probe->pose.position;
     state.workspace_probe = tick.workspace.pose.position;
     state.view = view;
   }
@@ -126,7 +116,11 @@ bool sample(Tick& tick) noexcept {
     for (std::size_t i = state.contacts.size(); i-- > 0;) {
       Contact& contact = state.contacts[i];
       const auto felt = tick.scene.felt();
-      if (contact.instance >= felt.size() || !adopt(contact, felt[contact.instance])) state.contacts.swap_remove(i);
+      if (contact.instance >= felt.size() || !adopt(contact, felt[contact.instance])) {
+        state.contacts.swap_remove(i);
+      } else if (!tick.scene.facts(contact.instance).changes) {
+        contact.outside.reset();
+      }
     }
   }
   state.epoch = tick.scene.epoch();

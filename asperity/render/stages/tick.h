@@ -28,10 +28,11 @@ struct Tick {
   Seconds dt;
 
   // sample
-  ProbeSample probe;         ///< in the scene
-  bool direct = true;        ///< the scene is the workspace
-  bool first = false;        ///< of the state
-  bool changed = false;      ///< another scene than at the last tick
+  const ProbeSample* probe = &workspace;  ///< in the scene
+  FixedVector<ProbeSample, 1> in_scene;   ///< that, where the scene is not the workspace
+  bool direct = true;                     ///< the scene is the workspace
+  bool first = false;                     ///< of the state
+  bool changed = false;                   ///< another scene than at the last tick
   Vec3 held = Vec3::Zero();  ///< where the proxy was, before a change of the scene moved it: what its spring held
 
   // reach
@@ -55,7 +56,15 @@ struct Tick {
 };
 
 /// Whether a sample is a place at all. [servo]
-bool is_place(const ProbeSample& probe) noexcept;
+inline bool is_place(const ProbeSample& probe) noexcept {
+  // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
+  constexpr double farthest = 1e6;
+  if (!(probe.pose.position.squaredNorm() < farthest * farthest)) return false;
+  // 0 times a number is 0; times an infinity or no number it is none.
+  return 0.0 * (probe.pose.orientation.coeffs().sum() + probe.twist.linear.sum() + probe.twist.angular.sum() +
+                probe.time.count()) ==
+         0.0;
+}
 /// Takes the probe into the scene and the state into the scene's snapshot. False where the sample is no place. [servo]
 bool sample(Tick& tick) noexcept;
 /// Finds the instances that the tick's motion can reach. [servo]

@@ -221,11 +221,9 @@ Pixel RayCaster::cast(double x, double y) {
     Interval part = clip(from, along, bounds.grown(1e-3 * bounds.diagonal()));
     part.to = std::min(part.to, nearest.depth);
     if (part.from >= part.to) continue;
-    const Pixel seen = std::visit(
-        [&](const auto& s) {
-          return first_hit(*s, from, along, part, instance.sides.value_or(natural_sides(instance.surface)), caches_[i]);
-        },
-        instance.surface);
+    const Pixel seen =
+        std::visit([&](const auto& s) { return first_hit(*s, from, along, part, sides_of(instance), caches_[i]); },
+                   instance.surface);
     if (!seen.hit() || seen.depth >= nearest.depth) continue;
     nearest = seen;
     Vec3 normal = seen.normal.dot(along) > 0.0 ? Vec3(-seen.normal) : seen.normal;

@@ -51,9 +51,6 @@ class FieldChart {
     f.h_vv -= off * vv_;
     return f;
   }
-  [[nodiscard]] static WalkStep sized(const WalkStep& step) noexcept {
-    return {step.u, step.v, std::hypot(step.u, step.v)};
-  }
   [[nodiscard]] double rest_length(bool) const noexcept { return surface_.settled(); }
   [[nodiscard]] double stride() const noexcept { return 0.5 * surface_.grain(); }
   [[nodiscard]] bool has_flanks() const noexcept { return surface_.has_folds(); }

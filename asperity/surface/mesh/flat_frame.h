@@ -10,10 +10,10 @@ namespace asperity {
 
 /// A point of a face.
 struct FlatSpot {
-  Vec3 point = Vec3::Zero();
-  Vec3 along_u = Vec3::Zero();  ///< from the first corner to the second
-  Vec3 along_v = Vec3::Zero();  ///< and to the third
-  Vec3 front = Vec3::Zero();    ///< unit
+  Vec3 point;
+  Vec3 along_u;  ///< from the first corner to the second
+  Vec3 along_v;  ///< and to the third
+  Vec3 front;    ///< unit
 };
 
 /// What evaluating a face, and walking over it, needs.

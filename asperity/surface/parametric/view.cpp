@@ -40,7 +40,6 @@ class ParameterChart {
     f.h_vv = f.vv + off * spot_.front.dot(spot_.vv);
     return f;
   }
-  [[nodiscard]] WalkStep sized(const WalkStep& step) const noexcept { return {step.u, step.v, direction(step).norm()}; }
   [[nodiscard]] double rest_length(bool) const noexcept { return rest_; }
   [[nodiscard]] double stride() const noexcept { return surface_.stride(); }
   [[nodiscard]] bool blocked(const WalkStep& step) const noexcept { return over(0, step.u) || over(1, step.v); }
@@ -115,7 +114,7 @@ class ParameterChart {
     double curvature = square + bend.dot(rest);
     if (!(curvature > 0.02 * square)) curvature = square;
     const double size = -tangent.dot(rest) / curvature;
-    const WalkStep along = sized(u_over ? WalkStep{0.0, size} : WalkStep{size, 0.0});
+    const WalkStep along{u_over ? 0.0 : size, u_over ? size : 0.0, std::abs(size) * std::sqrt(square)};
     return blocked(along) ? WalkStep{} : along;
   }
 

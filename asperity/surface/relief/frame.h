@@ -28,13 +28,15 @@ struct ReliefFrame {
   double share_v = 0.0;
 };
 
-/// A point of the displaced surface x(u, v) = V + H N over one triangle, with its tangents (m).
+/// A point of the displaced surface x(u, v) = V + H N over one triangle, with its tangents (m). Nothing is known before
+/// it is evaluated: walks hold several, and would otherwise fill them twice.
 struct ReliefPoint {
-  Vec3 point = Vec3::Zero();
-  Vec3 along_u = Vec3::Zero();
-  Vec3 along_v = Vec3::Zero();
-  Vec3 front = Vec3::Zero();  ///< unit normal, outward
-  HeightJet jet;              ///< of the height as rendered: stitched and lowered
+  Vec3 point;
+  Vec3 along_u;
+  Vec3 along_v;
+  Vec3 front;      ///< unit normal, outward
+  Vec3 direction;  ///< N
+  HeightJet jet;   ///< of the height as rendered: stitched and lowered
 };
 
 /// A triangle and a place on it.

@@ -82,19 +82,6 @@ HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) 
   return blended;
 }
 
-ReliefPoint ReliefSurface::point(const ReliefFrame& frame, double u, double v) const noexcept {
-  ReliefPoint spot;
-  spot.jet = height(frame, u, v);
-  const Vec3 direction = frame.prism.direction_at(u, v);
-  spot.point = frame.prism.base_at(u, v) + spot.jet.height * direction;
-  spot.along_u = frame.prism.edge_u + spot.jet.u * direction + spot.jet.height * frame.prism.turn_u;
-  spot.along_v = frame.prism.edge_v + spot.jet.v * direction + spot.jet.height * frame.prism.turn_v;
-  spot.front = spot.along_u.cross(spot.along_v);
-  const double size = spot.front.norm();
-  if (size > 0.0) spot.front /= size;
-  return spot;
-}
-
 HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept {
   HeightRange all = coat_.range(frame.coat, corners);
   const auto include = [&](const HeightRange& other) {

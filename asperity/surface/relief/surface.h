@@ -90,7 +90,19 @@ class ReliefSurface {
   /// Height as rendered over a place of the frame's triangle. [servo]
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
   /// The displaced surface over it. [servo]
-  [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept {
+    ReliefPoint spot;
+    spot.jet = height(frame, u, v);
+    const ShellPrism& prism = frame.prism;
+    spot.direction = prism.direction_at(u, v);
+    spot.point = prism.base_at(u, v) + spot.jet.height * spot.direction;
+    spot.along_u = prism.edge_u + spot.jet.u * spot.direction + spot.jet.height * prism.turn_u;
+    spot.along_v = prism.edge_v + spot.jet.v * spot.direction + spot.jet.height * prism.turn_v;
+    spot.front = spot.along_u.cross(spot.along_v);
+    const double size = spot.front.norm();
+    if (size > 0.0) spot.front /= size;
+    return spot;
+  }
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
   /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. False where no

@@ -25,6 +25,8 @@ struct ReliefFaces {
 
   const ReliefSurface& surface;
   CoatMoment moment;
+  double rest = std::min(relief_rest_of_grain * surface.grain(), rest_of_edge* mesh().mean_edge());
+  double first_rest = std::min(first_rest_of_grain * surface.grain(), rest);
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface.base().mesh(); }
   [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept { return surface.frame(face, moment); }
@@ -34,7 +36,7 @@ struct ReliefFaces {
   [[nodiscard]] static WalkForms forms(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& goal) noexcept {
     const ShellPrism& prism = place.frame.prism;
     const Vec3 rest = spot.point - goal;
-    const double n = prism.direction_at(place.u, place.v).dot(rest);
+    const double n = spot.direction.dot(rest);
     const double turn_u = prism.turn_u.dot(rest);
     const double turn_v = prism.turn_v.dot(rest);
     WalkForms f;
@@ -54,12 +56,9 @@ struct ReliefFaces {
     const double bend = du * du * spot.jet.uu + 2.0 * du * dv * spot.jet.uv + dv * dv * spot.jet.vv;
     const double slope = du * spot.jet.u + dv * spot.jet.v;
     const Vec3 turn = du * prism.turn_u + dv * prism.turn_v;
-    return bend * prism.direction_at(place.u, place.v).dot(rest) + 2.0 * slope * turn.dot(rest);
+    return bend * spot.direction.dot(rest) + 2.0 * slope * turn.dot(rest);
   }
-  [[nodiscard]] double rest_length(bool first) const noexcept {
-    const double rest = std::min(relief_rest_of_grain * surface.grain(), rest_of_edge * mesh().mean_edge());
-    return first ? std::min(first_rest_of_grain * surface.grain(), rest) : rest;
-  }
+  [[nodiscard]] double rest_length(bool first) const noexcept { return first ? first_rest : rest; }
   [[nodiscard]] double stride() const noexcept { return stride_of_grain * surface.grain(); }
   [[nodiscard]] bool jumps() const noexcept { return surface.has_jumps(); }
   [[nodiscard]] static bool free(const ReliefFrame&, const ReliefPoint&, const ReliefPoint&) noexcept { return true; }
@@ -72,28 +71,6 @@ DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint
   const ReliefFaces faces{surface, place.frame.coat.moment};
   FaceChart<ReliefFaces> chart(faces, place, spot);
   return Walk<FaceChart<ReliefFaces>>(chart, goal, side).run();
-}
-
-ReliefCache& ReliefView::hold(std::uint32_t face) const noexcept {
-  ReliefCache& cache = cache_->relief;
-  if (!surface_->holds(cache.place.frame, face, moment_)) {
-    cache.place.frame = surface_->frame(face, moment_);
-    cache.evaluated = false;
-  }
-  return cache;
-}
-
-ReliefPoint ReliefView::at(const Place& place, const Vec3&) const noexcept {
-  ReliefCache& cache = hold(place.element);
-  const double u = place.at[1];
-  const double v = place.at[2];
-  if (!cache.evaluated || cache.place.u != u || cache.place.v != v) {
-    cache.place.u = u;
-    cache.place.v = v;
-    cache.spot = surface_->point(cache.place.frame, u, v);
-    cache.evaluated = true;
-  }
-  return cache.spot;
 }
 
 DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept {
@@ -110,7 +87,7 @@ DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal
 
 Mat3 ReliefView::bend(const Place& place, const ReliefPoint& spot) const noexcept {
   const ShellPrism& prism = frame(place.element).prism;
-  const Vec3 direction = prism.direction_at(place.at[1], place.at[2]);
+  const Vec3& direction = spot.direction;
   const HeightJet& h = spot.jet;
   const double uu = spot.front.dot(h.uu * direction + 2.0 * h.u * prism.turn_u);
   const double uv = spot.front.dot(h.uv * direction + h.u * prism.turn_v + h.v * prism.turn_u);

@@ -27,7 +27,18 @@ class ReliefView {
                                  Sides sides) const noexcept;
   /// Of the displaced surface. `normal` is that of the surface, turned towards p.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
-  [[nodiscard]] ReliefPoint at(const Place& place, const Vec3& normal = Vec3::Zero()) const noexcept;
+  [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
+    ReliefCache& cache = hold(place.element);
+    const double u = place.at[1];
+    const double v = place.at[2];
+    if (!cache.evaluated || cache.place.u != u || cache.place.v != v) {
+      cache.place.u = u;
+      cache.place.v = v;
+      cache.spot = surface_->point(cache.place.frame, u, v);
+      cache.evaluated = true;
+    }
+    return cache.spot;
+  }
   [[nodiscard]] Vec3 front(const Foot& foot) const noexcept { return at(place_of(foot)).front; }
   DescentEnd descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept;
   bool launch(const Place& place, const ReliefPoint& spot, Vec3& from) const noexcept {
@@ -60,7 +71,14 @@ class ReliefView {
   [[nodiscard]] const ReliefFrame& frame(std::uint32_t face) const noexcept { return hold(face).place.frame; }
 
  private:
-  [[nodiscard]] ReliefCache& hold(std::uint32_t face) const noexcept;
+  [[nodiscard]] ReliefCache& hold(std::uint32_t face) const noexcept {
+    ReliefCache& cache = cache_->relief;
+    if (!surface_->holds(cache.place.frame, face, moment_)) {
+      cache.place.frame = surface_->frame(face, moment_);
+      cache.evaluated = false;
+    }
+    return cache;
+  }
   [[nodiscard]] static Place place_of(const Foot& foot) noexcept { return {foot.element, false, foot.at}; }
   template <class Skip>
   [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept;
