@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 
+#include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/render/step.h"
 #include "bench/embree_peer.h"
@@ -20,10 +21,27 @@ double seconds_since(Clock::time_point start) {
 
 /// How a row touches the mesh.
 struct MeshTouch {
-  double radius = 0.0;    ///< m
-  bool friction = false;  ///< 0.3 / 0.2
-  bool resting = false;   ///< where the slide begins, and stays there
+  double radius = 0.0;     ///< m
+  bool friction = false;   ///< 0.3 / 0.2
+  bool resting = false;    ///< where the slide begins, and stays there
+  std::size_t others = 0;  ///< instances around it, out of reach
 };
+
+/// Small spheres in a cloud around the large one, nearest 5 mm from it.
+Status add_others(std::size_t count, std::vector<Instance>& instances) {
+  if (count == 0) return success();
+  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(icosphere(1, 2e-3)));
+  Instance small;
+  small.surface = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
+  Rng rng(7);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 direction(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    small.name = "small " + std::to_string(i);
+    small.world_from_object.position = (sphere_radius + rng.uniform(7e-3, 30e-3)) * direction.normalized();
+    instances.push_back(small);
+  }
+  return success();
+}
 
 /// A row that takes a probe through `step`.
 Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSurface>& surface,
@@ -36,7 +54,9 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSu
     sphere.material.static_friction = 0.3;
     sphere.material.dynamic_friction = 0.2;
   }
-  ASPERITY_TRY(Scene scene, Scene::build({sphere}, touch.radius));
+  std::vector<Instance> instances{sphere};
+  ASPERITY_CHECK(add_others(touch.others, instances));
+  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), touch.radius));
   ProxyState state;
   ProxyCache cache;
   ProbeSample probe;
@@ -115,6 +135,7 @@ Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_
   ASPERITY_CHECK(add(god_object_radius, {.radius = 1e-3}));
   ASPERITY_CHECK(add("god-object, point, resting", {.resting = true}));
   ASPERITY_CHECK(add("proxy, point, friction", {.friction = true}));
+  ASPERITY_CHECK(add("god-object, point, among 1,000", {.others = 1000}));
   rows.push_back(closest_row(surface, slide));
   rows.push_back(closest_anew_row(surface, slide));
   rows.push_back(embree_row(embree_bounded, peer, slide, tracker_bound));
