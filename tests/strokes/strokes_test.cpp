@@ -261,6 +261,7 @@ std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally
 /// One of `parts` shares of the ticks.
 void never_through_never_stuck_never_lost(std::uint64_t part, std::uint64_t parts) {
   const double wanted = number_in("ASPERITY_STROKES", 1e6) / static_cast<double>(parts);
+  ASSERT_GE(wanted, 1.0) << "ASPERITY_STROKES takes a number of ticks";
   const std::uint64_t seed = seed_of_the_day();
   testing::Test::RecordProperty("seed", std::to_string(seed));
   Tally tally;
@@ -286,6 +287,7 @@ void never_through_never_stuck_never_lost(std::uint64_t part, std::uint64_t part
   for (const auto& [kind, count] : kinds) std::cout << count << " " << kind << "\n";
   std::cout << "seed " << seed << ": " << tally.ticks << " ticks, " << tally.touching << " touching, " << tally.through
             << " through, " << tally.lost << " lost, " << tally.stuck << " stuck, " << tally.asked << " asked\n";
+  EXPECT_GT(tally.touching, tally.ticks / 4) << "too little was touched to prove anything";
 }
 
 class Strokes : public testing::TestWithParam<std::uint64_t> {};
