@@ -264,6 +264,62 @@ TEST(Junctions, AFastPointIsNotKeptByAVertex) {
   }
 }
 
+// A ball led along a box's edge and around it, now and then lifted off, is each time where the edge's round offset is
+// nearest to the probe, however far it was pressed in one tick.
+TEST(Junctions, ABallRollsAroundAnEdgeAndAlongIt) {
+  const double radius = 1.5e-3;
+  const double half = 0.02;
+  const Scene scene = scene_from({mesh_at(box_mesh(Vec3::Constant(2.0 * half)), Vec3::Zero())}, radius);
+  // Around the edge along y, at x = z = half.
+  const auto around = [&](double y, double angle, double distance) -> Vec3 {
+    return Vec3(half, y, half) + distance * Vec3(std::sin(angle), 0.0, std::cos(angle));
+  };
+  Rng rng(5);
+  for (int stroke = 0; stroke < 200; ++stroke) {
+    ProxyState state;
+    double y = rng.uniform(-0.01, 0.01);
+    double angle = rng.uniform(0.2, 1.3);
+    test::touch(scene, state, around(y, angle, 1.1 * radius));
+    for (int tick = 0; tick < 40; ++tick) {
+      y += rng.uniform(-1.0, 1.0) * std::pow(10.0, rng.uniform(-6.0, -3.3));
+      angle = std::clamp(angle + rng.uniform(-0.1, 0.1), 0.2, 1.3);
+      const double distance = (rng.below(3) == 0 ? rng.uniform(1.01, 1.3) : rng.uniform(0.2, 0.95)) * radius;
+      const ForceSample sample = test::touch(scene, state, around(y, angle, distance));
+      EXPECT_FALSE(sample.flags.has(TickFlag::not_converged)) << "stroke " << stroke << ", tick " << tick;
+      EXPECT_LT((sample.proxy - around(y, angle, std::max(radius, distance))).norm(), 2e-6)
+          << "stroke " << stroke << ", tick " << tick << ", distance " << distance;
+    }
+  }
+}
+
+// A ball that comes to a smooth surface in long strides is stopped by friction where it touches it, not where the
+// tangent plane ahead of it is known already.
+TEST(Junctions, FrictionHoldsOnlyByWhatIsTouched) {
+  const double radius = 1e-3;
+  const double ball = 0.02;
+  Instance instance = instance_of(
+      std::make_shared<const CustomSurface>(test::must(CustomSurface::build(test::SmoothBall{test::Ball{ball}}))));
+  instance.material.static_friction = 0.5;
+  instance.material.dynamic_friction = 0.4;
+  const Scene scene = scene_from({instance}, radius);
+  Rng rng(6);
+  for (int approach = 0; approach < 200; ++approach) {
+    ProxyState state;
+    const Vec3 up = test::random_direction(rng);
+    Vec3 probe = (ball + radius + rng.uniform(0.01e-3, 0.5e-3)) * up;
+    test::touch(scene, state, probe);
+    const Vec3 stride = -rng.uniform(0.05e-3, 0.4e-3) * (up + 0.5 * test::random_direction(rng)).normalized();
+    for (int tick = 0; tick < 8; ++tick) {
+      probe += stride;
+      const ForceSample sample = test::touch(scene, state, probe);
+      if (sample.wrench.force.isZero()) continue;
+      // A move of 2e-4 of its finest grain, here its radius, is not worth making.
+      EXPECT_NEAR(sample.proxy.norm(), ball + radius, 1.5 * 2e-4 * ball)
+          << "approach " << approach << ", tick " << tick;
+    }
+  }
+}
+
 }  // namespace
 
 }  // namespace asperity::strokes

@@ -150,6 +150,15 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
 }
 
+void JointSolve::rests_on(const Vec3& position, PlaneSet& out) noexcept {
+  touched(position, out);
+  for (std::size_t i = out.size(); i-- > 0;) {
+    const ConstraintPlane& plane = out[i];
+    const double rest = 2.0 * plane.skin + rest_of_smooth_grain * entries_[plane.owner].grain;
+    if (plane.normal.dot(position) - plane.offset - plane.skin > rest) out.swap_remove(i);
+  }
+}
+
 /// How far a ball may go so that its centre stays half of it away from a smooth surface: from there it can be pushed
 /// back to where it came from. As far each time as nothing is near.
 double JointSolve::free_share_of_ball(Entry& entry, const Segment& motion) noexcept {
@@ -265,6 +274,19 @@ bool JointSolve::loosen(const Vec3& position) noexcept {
   return feet_.size() < before;
 }
 
+/// Direction of the edge that a ball rests on, zero on a corner.
+Vec3 JointSolve::edge_of(const ConstraintPlane& plane) const noexcept {
+  const Touched& touch = *entries_[plane.owner].touch;
+  const Vec3& at = plane.contact.at;
+  Eigen::Index across = 0;
+  at.minCoeff(&across);
+  const auto next = static_cast<std::size_t>((across + 1) % 3);
+  const auto last = static_cast<std::size_t>((across + 2) % 3);
+  if (at[static_cast<Eigen::Index>(next)] <= 0.0 || at[static_cast<Eigen::Index>(last)] <= 0.0) return Vec3::Zero();
+  const auto corners = std::get_if<TriangleView>(&touch.view)->surface().mesh().corners(plane.contact.element);
+  return touch.turned((corners[last] - corners[next]).normalized());
+}
+
 /// On triangles alone: from one set of planes to the next.
 void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept {
   // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
@@ -277,15 +299,20 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   PlaneSet& planes = solution.planes;
   double distance = infinity;
   double stride = 1.0;
+  Vec3 nearest = solution.proxy;
+  const auto remember_nearest = [&] {
+    if ((solution.proxy - goal).squaredNorm() < (nearest - goal).squaredNorm()) nearest = solution.proxy;
+  };
   for (int move = 0; move < most_moves; ++move) {
     const bool patient = move >= patience;
+    if (patient) remember_nearest();
     if (patient) earlier = planes;
     planes.clear();
     touched(solution.proxy, planes);
     const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
     Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
     const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
-    if (rolling) target = rolling_target(planes[0], foot, goal, target);
+    if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target);
     Vec3 step = target - solution.proxy;
     if (step.norm() <= tolerance_) {
       // Without contact nothing may remain between proxy and probe: free space gives no force at all.
@@ -311,6 +338,12 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     const double t = free_share({solution.proxy, solution.proxy + step});
     solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
   }
+  // Not at rest: of all places that the moves came by, the nearest.
+  remember_nearest();
+  if (nearest == solution.proxy) return;
+  solution.proxy = nearest;
+  planes.clear();
+  touched(nearest, planes);
 }
 
 /// Among surfaces of which some are smooth: only ever nearer to the goal.
@@ -378,17 +411,21 @@ void JointSolve::share_out(const Vec3& goal, ConstraintSolution& solution) noexc
   solution.projection = project_onto_planes(goal, solution.planes, false);
   solution.projection.feasible = false;
   if (!solution.projection.active.empty() || proxy == goal || entries_.empty()) return;
-  // Between two moves it touches nothing: what it met last is in its way, if anything is.
-  const std::size_t owner = feet_.empty() ? 0 : feet_[feet_.size() - 1].owner;
-  const Touched& touch = *entries_[owner].touch;
+  // Between two moves it touches nothing: what is nearest is in its way.
   const double way = (proxy - goal).norm();
-  const Foot foot = on_view(touch.view, [&](const auto& view) {
-    return view.nearest(touch.to_local(proxy), way + radius_ + gap(entries_[owner]), entries_[owner].near);
-  });
-  if (!foot.found()) return;
   const Vec3 normal = (proxy - goal) / way;
-  solution.planes.clear();
-  solution.planes.push_back({normal, normal.dot(proxy), 0.0, static_cast<std::uint32_t>(owner), foot});
+  double nearest = infinity;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Touched& touch = *entries_[i].touch;
+    const Foot foot = on_view(touch.view, [&](const auto& view) {
+      return view.nearest(touch.to_local(proxy), way + radius_ + gap(entries_[i]), entries_[i].near);
+    });
+    if (!foot.found() || foot.distance >= nearest) continue;
+    nearest = foot.distance;
+    solution.planes.clear();
+    solution.planes.push_back({normal, normal.dot(proxy), 0.0, static_cast<std::uint32_t>(i), foot});
+  }
+  if (solution.planes.empty()) return;
   solution.projection.active.push_back({0, way});
 }
 

@@ -57,6 +57,8 @@ class JointSolve {
   [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin_ + entry.skin; }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
+  /// Those of them that are touched, not only near: what friction can hold by.
+  void rests_on(const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] ConstraintPlane plane_of(std::size_t index, const Foot& contact) const noexcept;
   void triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
@@ -68,9 +70,11 @@ class JointSolve {
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] bool loosen(const Vec3& position) noexcept;
+  /// Whether a ball rests on an edge or corner of a mesh.
   [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept {
-    return radius_ > 0.0 && plane.contact.at.minCoeff() <= 0.0;
+    return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
   }
+  [[nodiscard]] Vec3 edge_of(const ConstraintPlane& plane) const noexcept;
 
   double radius_;
   GeneratedPatches* patches_;
@@ -113,7 +117,7 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
   ConstraintSolution solution;
   Vec3 proxy = from;
   PlaneSet planes;
-  touched(proxy, planes);
+  rests_on(proxy, planes);
   bool slid = false;
   bool landed = false;
   for (int round = 0; round < most_rounds; ++round) {
