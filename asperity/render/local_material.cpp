@@ -111,19 +111,19 @@ Attraction attraction_at(const Touched& touch, const Vec3& p) noexcept {
   const ReliefSurface* relief = relief_of(instance);
   const double band = attraction_reach(instance);
   if (relief == nullptr || band <= 0.0) return pull;
-  ReliefFrame frame;
   ShellPlace place;
-  if (!relief->locate(p, *touch.cache, touch.moment, frame, place)) return pull;
-  const FieldSample phi = relief->field(frame, place);
+  const ReliefFrame* frame = relief->locate(p, *touch.cache, touch.moment, place);
+  if (frame == nullptr) return pull;
+  const FieldSample phi = relief->field(*frame, place);
   if (phi.value >= band) return pull;
   double strength = instance.material.magnetism;
   Vec3 slope = Vec3::Zero();
   const MaterialMaps* maps = relief->coat().materials();
   if (maps != nullptr && maps->has(MaterialChannel::magnetism)) {
     const double stiffness = instance.zoom * instance.zoom;
-    const LocalMaterial local = relief->coat().material(frame.coat, place.u, place.v);
+    const LocalMaterial local = relief->coat().material(frame->coat, place.u, place.v);
     constexpr auto channel = static_cast<std::size_t>(MaterialChannel::magnetism);
-    const ShellGradients gradients = shell_gradients(frame.prism, place);
+    const ShellGradients gradients = shell_gradients(frame->prism, place);
     strength = stiffness * local.value[channel];
     slope = stiffness * (local.slope[channel].x() * gradients.u + local.slope[channel].y() * gradients.v);
   }

@@ -297,11 +297,10 @@ class SeriesBuilder {
                        BasePoint& at) {
     const auto* relief = std::get_if<std::shared_ptr<const ReliefSurface>>(&shape);
     if (relief == nullptr) return;
-    ReliefFrame frame;
     ShellPlace place;
-    if ((*relief)->locate(felt, cache, moment, frame, place)) {
-      const FieldSample sample = (*relief)->field(frame, place);
-      at.face = frame.face;
+    if (const ReliefFrame* frame = (*relief)->locate(felt, cache, moment, place)) {
+      const FieldSample sample = (*relief)->field(*frame, place);
+      at.face = frame->face;
       at.barycentric = place.barycentric();
       at.height = place.height;
       at.relief = sample.height;

@@ -64,9 +64,9 @@ LawForce normal_perturbation_force(const ImplicitSurface& surface, const Materia
 /// The shell around a probe, as the consistent forms of Algorithms 1 and 2 need it.
 struct ShellContact {
   bool found = false;       ///< false: no surface
-  bool located = false;     ///< false: no prism holds the probe, the nearest base point stands in
   bool beyond_rim = false;  ///< the foot is on the rim of an open mesh and the probe is not over the face
-  ReliefFrame frame;
+  /// In the view's cache. Null: no prism holds the probe, the nearest base point stands in.
+  const ReliefFrame* frame = nullptr;
   ShellPlace place;
 };
 ShellContact shell_contact(const ReliefView& view, const Vec3& probe) noexcept;

@@ -67,12 +67,12 @@ LawForce consistent_force(const HeightFieldLaw& law, const ReliefView& view, dou
                           Contact& contact) noexcept {
   const ShellContact at = shell_contact(view, probe);
   if (!at.found) return {};
-  FieldSample sample = at.located ? view.surface().own_field(at.frame, at.place) : view.eval(probe);
-  if (at.located && law.edge_taper > 0.0) {
+  FieldSample sample = at.frame != nullptr ? view.surface().own_field(*at.frame, at.place) : view.eval(probe);
+  if (at.frame != nullptr && law.edge_taper > 0.0) {
     // Phi = h - taper H: what own_field gave is h - H.
     const Taper taper = edge_taper(law.edge_taper, at.place.barycentric());
     const double height = sample.height;
-    const ShellGradients gradients = shell_gradients(at.frame.prism, at.place);
+    const ShellGradients gradients = shell_gradients(at.frame->prism, at.place);
     const Vec3 height_gradient = gradients.height - sample.gradient;
     const Vec3 taper_gradient = taper.by_u * gradients.u + taper.by_v * gradients.v;
     sample.value = at.place.height - taper.factor * height;
@@ -95,12 +95,15 @@ LawForce height_field_force(const HeightFieldLaw& law, const ReliefView& view, c
 ShellContact shell_contact(const ReliefView& view, const Vec3& probe) noexcept {
   const MeshSurface& base = view.surface().base();
   ShellContact contact;
-  contact.located = view.locate(probe, contact.frame, contact.place);
-  // The nearest base point, from the patch that locating just used.
-  const Foot nearest = view.nearest_base(probe);
+  contact.frame = view.locate(probe, contact.place);
+  // A rim needs a foot on it, and there is a foot wherever there is a triangle.
+  if (base.mesh().report().closed()) {
+    contact.found = true;
+    return contact;
+  }
+  const Foot nearest = view.nearest_base(probe);  // from the patch that locating just used
   contact.found = nearest.found();
-  if (contact.found && !base.mesh().report().closed())
-    contact.beyond_rim = beyond_rim(base.mesh(), nearest, probe, view.skin());
+  if (contact.found) contact.beyond_rim = beyond_rim(base.mesh(), nearest, probe, view.skin());
   return contact;
 }
 

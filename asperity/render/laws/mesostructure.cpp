@@ -93,7 +93,7 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
 LawForce consistent_force(const ReliefView& view, double stiffness, const Vec3& probe, Contact& contact) noexcept {
   const ShellContact at = shell_contact(view, probe);
   if (!at.found) return {};
-  const FieldSample sample = at.located ? view.surface().field(at.frame, at.place) : view.eval(probe);
+  const FieldSample sample = at.frame != nullptr ? view.surface().field(*at.frame, at.place) : view.eval(probe);
   return potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim, stiffness,
                            probe, contact);
 }

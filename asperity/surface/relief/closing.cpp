@@ -391,14 +391,14 @@ RayStart start_over(const ReliefSurface& surface, const ReliefFrame& frame, doub
   constexpr int most_steps = 16;
   for (int i = 0; i < most_steps; ++i) {
     ShellPlace place;
-    ReliefFrame owner;
-    if (!surface.locate(ray.at(height), cache, {}, owner, place)) break;
-    const FieldSample sample = surface.field(owner, place);
+    const ReliefFrame* owner = surface.locate(ray.at(height), cache, {}, place);
+    if (owner == nullptr) break;
+    const FieldSample sample = surface.field(*owner, place);
     const double rise = sample.gradient.dot(ray.direction);
     if (!(rise > 0.1)) break;
     const double step = sample.value / rise;
     height -= step;
-    if (std::abs(step) <= 1e-9 * surface.grain()) return {true, height, {owner, place.u, place.v}};
+    if (std::abs(step) <= 1e-9 * surface.grain()) return {true, height, {*owner, place.u, place.v}};
   }
   return {false, own, {frame, u, v}};
 }

@@ -162,16 +162,17 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
   return all;
 }
 
-bool ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
-                           ShellPlace& place) const noexcept {
+const ReliefFrame* ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment,
+                                         ShellPlace& place) const noexcept {
   constexpr int most_walks = 24;
   constexpr double inside = -1e-10;
   const Foot foot = base_.index().closest(p, infinity, cache.patch);
-  if (!foot.found()) return false;
+  if (!foot.found()) return nullptr;
   const TriangleMesh& mesh = base_.mesh();
   std::uint32_t face = foot.element;
   place = {foot.at[1], foot.at[2], 0.0};
-  const double above = mesh.face_normal(face).dot(p - foot.point);
+  const auto [a, b, c] = mesh.corners(face);
+  const double above = (b - a).cross(c - a).dot(p - foot.point);
   place.height = std::copysign(foot.distance, above);
   for (int walk = 0; walk < most_walks; ++walk) {
     ReliefCache& last = cache.relief;
@@ -180,15 +181,12 @@ bool ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment&
       last.evaluated = false;
     }
     const ShellPrism& prism = last.place.frame.prism;
-    if (!prism.invert(p, place) && !prism.invert_anew(p, place)) return false;
+    if (!prism.invert(p, place) && !prism.invert_anew(p, place)) return nullptr;
     const Vec3 barycentric = place.barycentric();
     int out = 0;
-    if (barycentric.minCoeff(&out) >= inside) {
-      frame = last.place.frame;
-      return true;
-    }
+    if (barycentric.minCoeff(&out) >= inside) return &last.place.frame;
     const std::uint32_t other = mesh.neighbour(face, (out + 1) % 3);
-    if (other == no_index) return false;
+    if (other == no_index) return nullptr;
     // Guess: the same height over the common edge.
     const Vec3 edge = prism.base_at(place.u, place.v);
     face = other;
@@ -196,7 +194,7 @@ bool ReliefSurface::locate(const Vec3& p, SurfaceCache& cache, const CoatMoment&
     place.u = guess[1];
     place.v = guess[2];
   }
-  return false;
+  return nullptr;
 }
 
 FieldSample ReliefSurface::own_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
@@ -217,9 +215,8 @@ FieldSample ReliefSurface::field(const ReliefFrame& frame, const ShellPlace& pla
 }
 
 FieldSample ReliefSurface::eval(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment) const noexcept {
-  ReliefFrame owner;
   ShellPlace place;
-  if (locate(p, cache, moment, owner, place)) return field(owner, place);
+  if (const ReliefFrame* owner = locate(p, cache, moment, place)) return field(*owner, place);
   const Foot nearest = base_.index().closest(p, infinity, cache.patch);
   FieldSample sample;
   if (!nearest.found()) return sample;

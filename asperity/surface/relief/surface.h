@@ -105,10 +105,10 @@ class ReliefSurface {
   }
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
-  /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. False where no
-  /// prism holds p. [servo]
-  [[nodiscard]] bool locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment, ReliefFrame& frame,
-                            ShellPlace& place) const noexcept;
+  /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. Its triangle,
+  /// which stays in `cache` until another one is asked for; null where no prism holds p. [servo]
+  [[nodiscard]] const ReliefFrame* locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment,
+                                          ShellPlace& place) const noexcept;
   /// Value and gradient of Phi at a located place. [servo]
   [[nodiscard]] FieldSample field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   /// Value and gradient of h - H with the face's own height, not stitched (Algorithm 1). [servo]

@@ -47,8 +47,8 @@ class ReliefView {
   }
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p, *cache_, moment_); }
   /// ReliefSurface::locate.
-  bool locate(const Vec3& p, ReliefFrame& frame, ShellPlace& place) const noexcept {
-    return surface_->locate(p, *cache_, moment_, frame, place);
+  const ReliefFrame* locate(const Vec3& p, ShellPlace& place) const noexcept {
+    return surface_->locate(p, *cache_, moment_, place);
   }
   /// The nearest point of the base mesh.
   [[nodiscard]] Foot nearest_base(const Vec3& p) const noexcept {
