@@ -31,9 +31,8 @@ struct WalkForms {
 /// Newton's step where the squared distance is convex, Gauss and Newton's where it is not. [servo]
 inline WalkStep newton_step(const WalkForms& f) noexcept {
   const auto solved = [&](double uu, double uv, double vv, double det) {
-    const double per = -1.0 / det;
-    const double u = per * (vv * f.g_u - uv * f.g_v);
-    const double v = per * (uu * f.g_v - uv * f.g_u);
+    const double u = -(vv * f.g_u - uv * f.g_v) / det;
+    const double v = -(uu * f.g_v - uv * f.g_u) / det;
     return WalkStep{u, v, std::sqrt(std::max(0.0, u * (u * f.uu + 2.0 * v * f.uv) + v * v * f.vv))};
   };
   const double det = f.uu * f.vv - f.uv * f.uv;
