@@ -24,6 +24,7 @@ struct Body {
   double size = 0.0;   ///< m: of a ball within it, by which others are laid around it
   double error = 0.0;  ///< m, between what is felt and what `distance` tells
   std::string name;
+  double rim = infinity;  ///< m, of a sheet: beyond that from its middle, sideways, `distance` is of what is not there
 };
 
 /// Distance to one triangle, by its planes, edges and corners in turn.
@@ -148,7 +149,11 @@ inline Body relief(Rng& rng) {
   };
   auto map = test::map_of(512, [&](double s, double t) { return height((s - 0.5) * side, (t - 0.5) * side); });
   return {instance_of(test::coated(plane_grid(side, side, 2, 2), std::move(map), Mapping::uv, side)),
-          sheet_distance(height, 3e-3), 0.01, 3e-6, "relief"};
+          sheet_distance(height, 3e-3),
+          0.01,
+          3e-6,
+          "relief",
+          0.5 * side};
 }
 
 inline Body iso(Rng& rng) {

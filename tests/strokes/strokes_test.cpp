@@ -74,6 +74,14 @@ class Bodies {
     for (const Body& body : bodies_) least = std::min(least, body.distance(p));
     return least - radius_;
   }
+  /// Whether the clearance around `p` is known: near the rim of a sheet it is not.
+  [[nodiscard]] bool known(const Vec3& p) const {
+    constexpr double deepest = 3e-3;
+    return std::all_of(bodies_.begin(), bodies_.end(), [&](const Body& body) {
+      const Vec3 local = body.instance.world_from_object.apply_inverse(p);
+      return local.head<2>().cwiseAbs().maxCoeff() < body.rim - radius_ - deepest;
+    });
+  }
   /// A place where the clearance is `depth` below 0, on the way from anywhere around `centre`.
   [[nodiscard]] Vec3 at_clearance(Rng& rng, const Vec3& centre, double around, double wanted) const {
     const Vec3 start = centre + around * random_in_ball(rng);
@@ -217,6 +225,10 @@ std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally
       ++tally.ticks;
       const double force = sample.wrench.force.norm();
       if (force > 0.0) ++tally.touching;
+      if (!bodies.known(probe) || !bodies.known(sample.proxy)) {
+        held_since.reset();
+        continue;
+      }
       const double inside = -bodies.clearance(sample.proxy);
       if (inside > tolerance) {
         ++tally.through;
