@@ -84,14 +84,13 @@ inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, 
   best.contact = triangle_foot(element, at_stop, motion.from + best.t * direction, cross.normalized(), tolerance);
 }
 
-/// Adds the plane of triangle (a, b, c) if it comes within `reach` of `position`; of one plane the nearest triangle
-/// stays. [servo]
+/// Adds the plane of triangle (a, b, c) if its point nearest to `position`, `point`, comes within `reach`; of one plane
+/// the nearest triangle stays. [servo]
 inline void add_triangle_contact(std::uint32_t element, const Vec3& a, const Vec3& b, const Vec3& c,
-                                 const Vec3& position, double reach, Sides sides, const ContactTolerance& tolerance,
-                                 ContactSet& out) noexcept {
+                                 const TrianglePoint& point, const Vec3& position, double reach, Sides sides,
+                                 const ContactTolerance& tolerance, ContactSet& out) noexcept {
   // Two contacts whose normals differ by less than this angle are one plane: their common line is undefined.
   constexpr double same_plane_cosine = 1.0 - 1e-10;
-  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
   if (point.squared_distance > reach * reach) return;
   const Vec3 cross = (b - a).cross(c - a);
   if (sides == Sides::front && cross.dot(position - a) < 0.0) return;

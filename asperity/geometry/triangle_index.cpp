@@ -140,9 +140,7 @@ bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, doubl
   bool free = true;
   scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (distance > touch + margin || !free) return;
-    const auto [a, b, c] = mesh().corners(face);
-    free = closest_point_on_triangle(end, a, b, c).squared_distance > blocked * blocked;
-    add_contact(face, end, touch, sides, contacts);
+    free = add_contact(face, end, touch, sides, contacts) > blocked * blocked;
   });
   if (!free) return false;
   settle_edges(end, contacts);
@@ -209,10 +207,12 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
   return best;
 }
 
-void TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
-                                ContactSet& out) const noexcept {
+double TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
+                                  ContactSet& out) const noexcept {
   const auto [a, b, c] = mesh().corners(face);
-  add_triangle_contact(face, a, b, c, position, reach, sides, tolerance_, out);
+  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
+  add_triangle_contact(face, a, b, c, point, position, reach, sides, tolerance_, out);
+  return point.squared_distance;
 }
 
 void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {

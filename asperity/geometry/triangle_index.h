@@ -117,7 +117,9 @@ class TriangleIndex {
   void settle_edges(const Vec3& position, ContactSet& contacts) const noexcept;
   void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
                 TrianglePatch& patch) const noexcept;
-  void add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides, ContactSet& out) const noexcept;
+  /// Answers the squared distance to the face (m^2).
+  double add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
+                     ContactSet& out) const noexcept;
 
   std::shared_ptr<const Inside> inside_;
   std::uint64_t identity_ = 0;

@@ -191,9 +191,7 @@ bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
     // In u and v an edge is 1; heights are measured by the triangle's size.
     const double change = std::abs(step_u) + std::abs(step_v) + std::abs(step_h) / std::sqrt(across.norm());
     if (!(change < 1e6)) return false;
-    // What a further step of Newton's would change, where it converges: C e^2 with the C of the last two.
-    const double next = i == 0 ? infinity : change * (change / last) * (change / last);
-    if (change <= 1e-13 || (change <= 1e-6 && (change >= last || next <= 1e-15))) return determinant(place) > 0.0;
+    if (change <= 1e-13 || (change <= 1e-6 && change >= last)) return determinant(place) > 0.0;
     last = change;
   }
   return false;

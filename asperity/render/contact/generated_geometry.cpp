@@ -346,7 +346,8 @@ void GeneratedPatch::contacts(const Vec3& position, double radius, Sides sides, 
   ContactSet found;
   for (std::uint32_t facet = 0; facet < facets_.size(); ++facet) {
     const auto [a, b, c] = corners(facet);
-    add_triangle_contact(facet, a, b, c, position, reach, sides, tolerance_, found);
+    add_triangle_contact(facet, a, b, c, closest_point_on_triangle(position, a, b, c), position, reach, sides,
+                         tolerance_, found);
   }
   settle_edge_contacts(
       position, tolerance_, [&](std::uint32_t facet) { return corners(facet); }, found);

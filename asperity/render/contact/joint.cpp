@@ -64,7 +64,7 @@ bool JointSolve::complete() const noexcept {
 bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept {
   Entry& entry = entries_[index];
   const Touched& touch = *entry.touch;
-  const Vec3 local = touch.pose->apply_inverse(position);
+  const Vec3 local = touch.to_local(position);
   // How far beyond touching a tangent plane is worth knowing.
   const double reach = radius_ + gap(entry) + (entry.folds ? 2.0 * entry.skin : 0.05 * entry.grain);
   // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
@@ -78,8 +78,8 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
     return found;
   });
   if (!foot.found() || (entry.near.back && touch.facts->sides == Sides::front)) return false;
-  const Vec3 normal = touch.pose->rotate(way);
-  plane = {normal, normal.dot(touch.pose->apply(foot.point)) + radius_, gap(entry), static_cast<std::uint32_t>(index),
+  const Vec3 normal = touch.turned(way);
+  plane = {normal, normal.dot(touch.to_world(foot.point)) + radius_, gap(entry), static_cast<std::uint32_t>(index),
            foot};
   return true;
 }
@@ -485,7 +485,7 @@ Vec3 shading_normal(const Instance& instance, Formulation formulation, const Foo
 }  // namespace
 
 void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact, LawForce& answer) noexcept {
-  const Vec3 shading = touch.pose->rotate(shading_normal(*touch.instance, law.formulation, contact));
+  const Vec3 shading = touch.turned(shading_normal(*touch.instance, law.formulation, contact));
   if (law.formulation == Formulation::literal) {
     answer.normal = shading;
     answer.force = answer.force.norm() * shading;
@@ -527,7 +527,7 @@ LawForce owner_force(const Touched& touch, const Material& material, std::size_t
   if (const auto* law = std::get_if<ForceShadingLaw>(&touch.instance->law)) shade(touch, *law, plane->contact, answer);
   if (strongest == strongest_of_all) answer.force += material.stiffness * (goal - probe.pose.position);
   answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
-  answer.point = touch.pose->apply(plane->contact.point);
+  answer.point = touch.to_world(plane->contact.point);
   answer.element = plane->contact.element;
   return answer;
 }

@@ -102,8 +102,8 @@ FineMotion motion_over(const Tick& tick, const Touched& touch) noexcept {
   const Vec3& position = tick.probe->pose.position;
   const Vec3& previous = tick.state.previous_probe;
   if (touch.instance->motion.moves()) {
-    return {touch.pose->apply_inverse(position) - touch.before->apply_inverse(previous),
-            touch.pose->rotate_inverse(velocity_over(tick, touch)), tick.dt};
+    return {touch.to_local(position) - touch.before->apply_inverse(previous),
+            touch.turned_back(velocity_over(tick, touch)), tick.dt};
   }
   return {touch.turned_back(position - previous), touch.turned_back(tick.probe->twist.linear), tick.dt};
 }
@@ -111,11 +111,11 @@ FineMotion motion_over(const Tick& tick, const Touched& touch) noexcept {
 /// A law's answer and its parts, turned into the world frame.
 void to_world(const Touched& touch, LawForce& law) noexcept {
   if (touch.at_origin) return;
-  law.force = touch.pose->rotate(law.force);
-  law.friction = touch.pose->rotate(law.friction);
-  law.texture = touch.pose->rotate(law.texture);
-  law.point = touch.pose->apply(law.point);
-  law.normal = touch.pose->rotate(law.normal);
+  law.force = touch.turned(law.force);
+  law.friction = touch.turned(law.friction);
+  law.texture = touch.turned(law.texture);
+  law.point = touch.to_world(law.point);
+  law.normal = touch.turned(law.normal);
 }
 
 /// Whether a law's own changes are paid for: not those of volumes, which have budgets of their own, nor what is felt as
@@ -135,7 +135,7 @@ double potential_of(const LawForce& law, double stiffness) noexcept {
 void limit_drag(Tick& tick, const Touched& touch, const Vec3& point, LawForce& law) noexcept {
   if (!touch.moved || (law.friction.isZero(0.0) && law.texture.isZero(0.0))) return;
   // Where in the world the surface's point there has come from within the tick.
-  const Vec3 motion = point - touch.before->apply(touch.pose->apply_inverse(point));
+  const Vec3 motion = point - touch.before->apply(touch.to_local(point));
   const double share = carried_share(law.friction + law.texture, motion, tick.state.tank);
   if (share >= 1.0) return;
   law.force -= (1.0 - share) * (law.friction + law.texture);
@@ -185,7 +185,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   const FineMotion motion = motion_over(tick, touch);
   const bool volume = touch.facts->volume;
   const Vec3 position = touch.to_local(tick.probe->pose.position);
-  const Vec3 previous = touch.pose->apply_inverse(tick.state.previous_probe);
+  const Vec3 previous = touch.to_local(tick.state.previous_probe);
   // The contact point's laws look the material up where that is.
   const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
   const Material material = elsewhere ? instance.material : local_material(touch, position);
@@ -202,8 +202,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
     if (!law.damped) {
       law.push = law.force.dot(law.normal);
       // Against the hand's own motion: damping by a surface that moves would drag the hand along.
-      law.force =
-          with_damping(law.force, law.normal, touch.pose->rotate_inverse(tick.probe->twist.linear), material.damping);
+      law.force = with_damping(law.force, law.normal, touch.turned_back(tick.probe->twist.linear), material.damping);
     }
   }
   const bool adds = touch.facts->adds_friction;
@@ -227,8 +226,7 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   const bool adds = touch.facts->adds_friction;
   const bool mapped = touch.facts->varies && !touch.facts->volume;
   MaterialRoom room;
-  const Material& local =
-      mapped ? material_there(touch, touch.pose->apply_inverse(law.point), room) : instance.material;
+  const Material& local = mapped ? material_there(touch, touch.to_local(law.point), room) : instance.material;
   if (local.viscosity > 0.0) add_viscosity(local.viscosity, velocity_over(tick, touch), law);
   if (!adds && instance.fine == nullptr) {
     limit_drag(tick, touch, law.point, law);
@@ -239,10 +237,10 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   const double stiffness = tick.proxy_share * part.stiffness;
   law.push = law.pulls ? 0.0 : stiffness * law.penetration;
   if (!touch.at_origin) {
-    law.force = touch.pose->rotate_inverse(law.force);
-    law.point = touch.pose->apply_inverse(law.point);
-    law.normal = touch.pose->rotate_inverse(law.normal);
-    law.friction = touch.pose->rotate_inverse(law.friction);
+    law.force = touch.turned_back(law.force);
+    law.point = touch.to_local(law.point);
+    law.normal = touch.turned_back(law.normal);
+    law.friction = touch.turned_back(law.friction);
     if (law.bends) {
       const Mat3 turn = touch.pose->orientation.toRotationMatrix();
       law.bend = turn.transpose() * law.bend * turn;
@@ -263,14 +261,14 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
 void add_attraction(Tick& tick, Touched& touch) noexcept {
   Contact& contact = *touch.contact;
   if (tick.changed || touch.moved) {
-    const double now = attraction_at(touch, touch.pose->apply_inverse(tick.state.previous_probe)).potential;
+    const double now = attraction_at(touch, touch.to_local(tick.state.previous_probe)).potential;
     contact.debt += std::max(0.0, now - contact.attraction);
   }
   contact.debt -= tick.state.tank.pay(contact.debt);
-  const Attraction pull = attraction_at(touch, touch.pose->apply_inverse(tick.probe->pose.position));
+  const Attraction pull = attraction_at(touch, touch.to_local(tick.probe->pose.position));
   contact.attraction = pull.potential;
   if (contact.debt > 0.0 || pull.force.isZero(0.0)) return;
-  tick.out.wrench.force += touch.pose->rotate(pull.force);
+  tick.out.wrench.force += touch.turned(pull.force);
   tick.out.flags.set(TickFlag::field_force);
 }
 

@@ -144,8 +144,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     smooth = true;
     // A little off the surface that a point was held on: from there a ball may roll.
     if (surface.rests)
-      from +=
-          2.0 * on_view(touch.view, [](const auto& view) { return view.skin(); }) * touch.pose->rotate(surface.normal);
+      from += 2.0 * on_view(touch.view, [](const auto& view) { return view.skin(); }) * touch.turned(surface.normal);
     surface.rests = false;
   }
   if (smooth && tick.surfaces_moved) static_cast<void>(joint.push_out(from));
