@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/render/fixtures.h"
+#include "tests/render/implicits.h"
 #include "tests/render/volumes.h"
 #include "tests/surface/custom_fields.h"
 
@@ -166,6 +167,15 @@ inline Body iso(Rng& rng) {
       ball_distance(radius), radius, 3e-3 * radius, "iso"};
 }
 
+inline Body implicit(Rng& rng) {
+  const double radius = rng.uniform(0.005, 0.015);
+  constexpr double band = 5e-3;
+  const auto grid = test::sparse_grid(ball_distance(radius), test::cube(radius + band), radius / 20.0, band, band);
+  Instance instance = test::implicit_instance(grid);
+  instance.material.stiffness = test::stiffness;
+  return {instance, ball_distance(radius), radius, 3e-3 * radius, "implicit"};
+}
+
 inline Body parametric(Rng& rng) {
   ParametricSettings settings;
   settings.shape = ParametricShape::sphere;
@@ -183,7 +193,7 @@ inline Body custom(Rng& rng) {
 
 using Maker = Body (*)(Rng&);
 inline const std::vector<Maker>& makers() {
-  static const std::vector<Maker> all = {box, polyhedron, relief, iso, parametric, custom};
+  static const std::vector<Maker> all = {box, polyhedron, relief, iso, implicit, parametric, custom};
   return all;
 }
 
