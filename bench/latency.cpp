@@ -92,6 +92,11 @@ Status measure_all(const Options& options, Report& report) {
     ASPERITY_TRY(Group group, measure_fine(subdivisions, effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
+  if (asked("formula")) {
+    say("spheres by formula");
+    ASPERITY_TRY(Group group, measure_formula(effort, report.clock_cost));
+    report.groups.push_back(std::move(group));
+  }
   for (const std::uint32_t triangles : moved) {
     say(fmt::format("moving {} triangles", triangles));
     ASPERITY_TRY(Group group, measure_refit(triangles, effort, report.clock_cost));
@@ -151,8 +156,8 @@ int main(int argc, char** argv) {
     app.add_flag("--check", options.check,
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
-    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential, fine or refit")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "refit"}));
+    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential, fine, formula or refit")
+        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit"}));
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();

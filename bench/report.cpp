@@ -83,6 +83,8 @@ std::string text_of(const Group& group) {
     text = fmt::format("\n{} of {}: {:.1f} MB; mesh and search structure in {:.3f} s, potential in {:.3f} s\n",
                        group.kind, group.size(), static_cast<double>(group.coat_bytes) * 1e-6, group.mesh_build_seconds,
                        group.search_build_seconds);
+  } else if (group.kind == "formula") {
+    text = fmt::format("\n{} of {}:\n", group.kind, group.size());
   } else if (group.kind == "refit") {
     text += '\n';
   } else if (group.coat_bytes > 0) {
@@ -108,7 +110,8 @@ std::string text_of(const Group& group) {
 }  // namespace
 
 std::string Group::size() const {
-  return resolution > 0 ? fmt::format("{0}^3 samples", resolution) : fmt::format("{} triangles", triangles);
+  if (resolution > 0) return fmt::format("{0}^3 samples", resolution);
+  return triangles > 0 ? fmt::format("{} triangles", triangles) : "one sphere";
 }
 
 std::vector<Ratio> Report::ratios() const {

@@ -41,7 +41,7 @@ struct Extra {
 
 /// What was measured on one mesh.
 struct Group {
-  std::string kind;  ///< "mesh", "relief", "volume", "potential", "fine" or "refit"
+  std::string kind;  ///< "mesh", "relief", "volume", "potential", "fine", "formula" or "refit"
   std::size_t triangles = 0;
   std::uint32_t resolution = 0;       ///< of a volume: samples along each axis
   double mesh_build_seconds = 0.0;    ///< welding, checks, adjacency, normals
@@ -53,7 +53,7 @@ struct Group {
   std::vector<RowResult> rows;
   std::vector<Extra> on_top;  ///< of "fine"
 
-  /// "1280 triangles", "128^3 samples".
+  /// "1280 triangles", "128^3 samples", "one sphere".
   [[nodiscard]] std::string size() const;
   /// The row of that name, or nullptr.
   [[nodiscard]] const RowResult* row(const std::string& name) const;
@@ -80,6 +80,10 @@ Result<Group> measure_potential(int subdivisions, const Effort& effort, double c
 /// The same mesh felt by its proxy alone, and with friction and texture as forces of their own on top: what they cost
 /// is measured against the bare contact in turn, a few ticks each, on the same slide. [build]
 Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_cost);
+
+/// The same sphere as a parametric surface and as a program's own, which tells value and gradient, or also how much it
+/// bends: the proxy law without friction and with 0.3 / 0.2. [build]
+Result<Group> measure_formula(const Effort& effort, double clock_cost);
 
 /// What moving all vertices costs, in place of one update: a sheet of about so many triangles, bare and with a coat of
 /// 256 x 256 texels by triplanar mapping, refitted and built anew. [build]
