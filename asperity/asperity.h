@@ -102,7 +102,7 @@
 
 // render: laws, scene, step
 #include "asperity/render/custom_law.h"
-#include "asperity/render/energy/tank.h"
+#include "asperity/render/energy/account.h"
 #include "asperity/render/felt.h"
 #include "asperity/render/field_effects.h"
 #include "asperity/render/fine/features.h"

@@ -42,6 +42,7 @@ LawForce CustomLaw::force(const Instance& instance, const FeltView& view, const 
   force.penetration = answer.penetration;
   force.element = answer.element;
   force.damped = answer.damped;
+  force.spring = answer.force - (answer.damping.allFinite() ? answer.damping : Vec3(Vec3::Zero()));
   if (answer.damped) force.push = std::max(0.0, answer.force.dot(answer.normal));
   return force;
 }

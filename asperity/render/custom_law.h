@@ -26,6 +26,9 @@ struct CustomForce {
   std::uint32_t element = no_index;  ///< face, cell or patch
   /// The force has its damping already; otherwise the material's is added along the normal, and never pulls.
   bool damped = false;
+  /// Of a force that has it: the part that resists the motion (N), which the hand never gets back. What is not told is
+  /// taken for a spring's, and softened where the hand has not put it in.
+  Vec3 damping = Vec3::Zero();
 };
 
 /// The surface that a law touches, object frame, whatever kind it is. [servo]

@@ -120,6 +120,7 @@ struct InstanceFacts {
   bool changes = false;         ///< and the surface may move or change its shape under the proxy
   bool moment = false;          ///< its coat moves or has levels of detail, and its law feels which
   bool draws = false;           ///< it draws the probe from outside
+  bool printed = false;         ///< its law is felt as printed: what that gives is paid by nobody
 };
 
 /// The relief of an instance that wears a coat, or nullptr. [servo]

@@ -310,6 +310,7 @@ InstanceFacts facts_of(const Instance& instance) {
   facts.changes = facts.constrains && changes(instance);
   facts.moment = feels_changing_coat(instance);
   facts.draws = attraction_reach(instance) > 0.0;
+  facts.printed = formulation_of(instance.law) == Formulation::literal;
   return facts;
 }
 
@@ -324,6 +325,23 @@ Status check_motion(const Instance& instance, std::size_t index) {
     return Error{
         ErrorCode::unsupported_pair, "moves a volume", {}, place, "motion of meshes, reliefs and parametric surfaces"};
   return success();
+}
+
+/// What a magnet gives to a hand that it draws in (J), with room for what a tick cannot resolve.
+double well_of(const Instance& instance) noexcept {
+  constexpr double room = 1.02;
+  double stiffness = 0.0;
+  double band = 0.0;
+  if (const auto* law = std::get_if<MagneticLaw>(&instance.law); law != nullptr) {
+    stiffness = instance.material.stiffness;
+    band = law->band;
+  } else if (attraction_reach(instance) > 0.0) {
+    const MaterialMaps* maps = relief_of(instance)->coat().materials();
+    const bool map = maps != nullptr && maps->has(MaterialChannel::magnetism);
+    stiffness = map ? maps->most(MaterialChannel::magnetism) : instance.material.magnetism;
+    band = instance.material.magnetic_band;
+  }
+  return room * stiffness * band * band / 6.0;
 }
 
 }  // namespace
@@ -371,6 +389,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
   for (const Instance& instance : instances) {
     scene.reads_volumes_ = scene.reads_volumes_ || iso_of(instance.surface) != nullptr;
     scene.moves_ = scene.moves_ || instance.motion.moves();
+    scene.lends_ += well_of(instance);
   }
   scene.felt_ = std::move(instances);
   scene.felt_effects_ = std::move(effects);

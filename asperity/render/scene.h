@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "asperity/core/result.h"
+#include "asperity/render/energy/account.h"
 #include "asperity/render/field_effects.h"
 #include "asperity/render/instance.h"
 
@@ -17,11 +18,13 @@ struct SceneSettings {
   /// Radius (m, workspace) of the tip whose path a point follows on coats with levels of detail by dilation; 0: none.
   double tip_radius = 0.0;
   View view = {};
-  /// Over how long a change of the scene is spread, as far as the tank pays for it (s); 0: felt at once.
+  /// Over how long a change of the scene is spread, as far as the account pays for it (s); 0: felt at once.
   Seconds handover{0.01};
   /// Power (W) that moving, deforming and changing surfaces may give to the hand beyond what it has spent on them: 0,
   /// the default, keeps every change passive.
   double change_power = 0.0;
+  /// J that the hand may get back later, through something else than it has put it in by.
+  double energy_capacity = EnergyAccount::default_capacity;
   /// How fast coats change their level of detail (levels a second), above 0.
   double level_rate = 8.0;
 };
@@ -55,6 +58,9 @@ class Scene {
   [[nodiscard]] bool direct() const noexcept { return direct_; }
   /// Whether an instance moves on by itself. [servo]
   [[nodiscard]] bool moves() const noexcept { return moves_; }
+  /// What the scene's magnets give to a hand that they draw in (J): it is lent at the start, and given back by leaving
+  /// them. [servo]
+  [[nodiscard]] double lends() const noexcept { return lends_; }
   /// Whether a surface that moves the proxy may move or change its shape under it. [servo]
   [[nodiscard]] bool changes() const noexcept { return changes_; }
   /// Radius of the probe's tip in the scene (m); 0 is a point. [servo]
@@ -101,6 +107,7 @@ class Scene {
   std::uint64_t epoch_ = 0;
   bool reads_volumes_ = false;
   bool moves_ = false;
+  double lends_ = 0.0;
   bool changes_ = false;
   bool direct_ = true;
 };

@@ -11,7 +11,7 @@
 #include "asperity/core/frames.h"
 #include "asperity/core/place.h"
 #include "asperity/material/friction.h"
-#include "asperity/render/energy/tank.h"
+#include "asperity/render/energy/account.h"
 #include "asperity/render/laws.h"
 #include "asperity/render/view.h"
 #include "asperity/surface/view.h"
@@ -20,21 +20,6 @@ namespace asperity {
 
 // --- what laws remember ---
 // Each type says by `of_surface` whether it means something on another surface that the same law is felt on.
-
-/// A law whose force is the slope of an energy: height-field, mesostructure.
-struct PotentialMemory {
-  static constexpr bool of_surface = false;
-  std::optional<double> potential;  ///< J, held at the last tick
-  double share = 1.0;               ///< of the force that is rendered: less where a change was not paid for
-  double stiffness = 0.0;           ///< N/m that it pushed with at the last tick
-};
-
-/// Consistent force shading.
-struct ShadingMemory {
-  static constexpr bool of_surface = false;
-  Vec3 turned = Vec3::Zero();  ///< its lateral force of the last tick (N, world)
-  double budget = 0.0;         ///< J: what that has taken from the hand and not yet given back
-};
 
 /// Cross-uncross. The point crossed and the gradient saved there are the contact's place and normal.
 struct CrossingMemory {
@@ -49,8 +34,6 @@ struct CrossingMemory {
 struct ContactPointMemory {
   static constexpr bool of_surface = true;
   Vec3 previous = Vec3::Zero();  ///< the probe at the last tick (m, object frame)
-  double stiffness = 0.0;        ///< felt (N/m); 0 in free space
-  double budget = 0.0;           ///< J that may be given back where the local stiffness rises
   bool pushed = false;           ///< at the last tick
 };
 
@@ -61,27 +44,16 @@ struct CustomMemory {
   std::array<std::byte, 64> bytes{};
 };
 
-using LawMemory =
-    std::variant<std::monostate, PotentialMemory, ShadingMemory, CrossingMemory, ContactPointMemory, CustomMemory>;
+using LawMemory = std::variant<std::monostate, CrossingMemory, ContactPointMemory, CustomMemory>;
 
 // --- what a contact remembers, by what it belongs to ---
-
-/// What one probe remembers of a texture that it touches.
-struct TextureState {
-  bool held = false;           ///< the next three are of the last tick
-  Vec3 force = Vec3::Zero();   ///< of the relief (N, object frame)
-  double potential = 0.0;      ///< of the relief (J)
-  double penetration = 0.0;    ///< to the relief (m); below 0 over a valley
-  double book = 0.0;           ///< J: what it has taken beyond what its potential holds; below 0: given
-  Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last
-};
 
 /// Of the law: goes on while the instance is felt by the same one.
 struct OfLaw {
   std::size_t index = std::variant_npos;  ///< in Law
   LawMemory memory;
-  FrictionState friction;  ///< of the friction law, where it is not within the proxy (object frame)
-  TextureState texture;
+  FrictionState friction;      ///< of the friction law, where it is not within the proxy (object frame)
+  Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last (object frame)
 };
 
 /// Of the surface: goes on while its mesh, its field or its formula does.
@@ -109,8 +81,8 @@ struct Contact {
   std::optional<bool> outside;
   Pose pose;                           ///< of the instance at the last tick
   std::optional<double> detail_level;  ///< of the coat, felt at the last tick
-  double attraction = infinity;        ///< J: potential of what draws the probe, at the last tick; infinity: not known
-  double debt = 0.0;                   ///< J: what that owes; it rests until that is paid
+  HeldForce push;                      ///< of a law without a proxy, with its texture
+  HeldForce drag;                      ///< of a friction law's spring
   OfSurface surface;
   OfLaw law;
 
@@ -127,7 +99,7 @@ struct Contact {
     return law.memory.emplace<Memory>();
   }
 };
-static_assert(std::is_trivially_copyable_v<PotentialMemory> && sizeof(Contact) < 480);
+static_assert(sizeof(Contact) < 480);
 
 /// Instances that one probe feels at once.
 inline constexpr std::size_t most_contacts = 8;
@@ -140,9 +112,8 @@ struct ProxyState {
   FixedVector<Contact, most_contacts> contacts;
   Vec3 previous_probe = Vec3::Zero();  ///< m, world, of the last tick
   Seconds previous_time{0.0};
-  /// Of the spring between probe and proxy: what a tick may hold at most, and what changes of the scene may spend.
-  EnergyTank tank;
-  double stiffness = 0.0;               ///< N/m of that spring as rendered at the last tick; 0: free
+  EnergyAccount account;
+  HeldForce spring;                     ///< between probe and proxy, with its textures
   Vec3 force = Vec3::Zero();            ///< N, scene: answered at the last tick
   Vec3 residual = Vec3::Zero();         ///< N, scene: what is left of the force before the last change of the scene
   Vec3 workspace_probe = Vec3::Zero();  ///< m: the probe at the last tick, before the view

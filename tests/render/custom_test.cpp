@@ -295,7 +295,10 @@ TEST(CustomLaw, ItsForceIsRenderedOnEveryKindOfSurface) {
 TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
   Instance instance = instance_of(surface_of(Ball{}));
   instance.law = law_of(Counting{});
-  const Scene scene = must(Scene::build({instance}, 0.0));
+  // It gives as it likes: the scene pays.
+  SceneSettings settings;
+  settings.change_power = settings.energy_capacity = 1e3;
+  const Scene scene = must(Scene::build({instance}, settings));
   ProxyState first;
   ProxyState second;
   for (int i = 1; i <= 5; ++i)
@@ -307,7 +310,7 @@ TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
   EXPECT_EQ(touch(scene, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 6.0);
   // Another law, though of the same type, starts anew.
   instance.law = law_of(Counting{});
-  const Scene next = must(Scene::build({instance}, 0.0));
+  const Scene next = must(Scene::build({instance}, settings));
   const double force = touch(next, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z();
   EXPECT_LE(force, 2.0);
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "asperity/render/laws/forces.h"
+#include "asperity/render/step.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/render/fixtures.h"
 
@@ -52,13 +53,42 @@ struct Touch {
 using PointTouch = Touch<VirtualContactPointLaw>;
 using MagnetTouch = Touch<MagneticLaw>;
 
+/// The same through whole ticks, which pay for what the law gives.
+struct WholeTouch {
+  Scene scene;
+  ProxyState state{};
+
+  template <class L>
+  explicit WholeTouch(const Touch<L>& touch) : scene(scene_of(touch)) {}
+
+  struct Felt {
+    Vec3 force;
+  };
+  Felt at(const Vec3& p) {
+    ProbeSample probe;
+    probe.pose.position = p;
+    return {step(scene, state, probe, Seconds(1e-3)).wrench.force};
+  }
+
+ private:
+  template <class L>
+  static Scene scene_of(const Touch<L>& touch) {
+    Instance instance;
+    instance.name = "implicit";
+    instance.surface = touch.surface;
+    instance.law = touch.law;
+    instance.material = touch.material;
+    return test::must(Scene::build({instance}, 0.0));
+  }
+};
+
 inline Vec3 far_outside() {
   return Vec3(0.0, 0.0, 1.0);
 }
 
 /// Forces (N) along a path, after having been far outside.
-template <class L>
-std::vector<Vec3> forces_along(Touch<L>& touch, std::span<const Vec3> path) {
+template <class T>
+std::vector<Vec3> forces_along(T& touch, std::span<const Vec3> path) {
   touch.at(far_outside());
   std::vector<Vec3> forces;
   for (const Vec3& p : path) forces.push_back(touch.at(p).force);
@@ -67,8 +97,8 @@ std::vector<Vec3> forces_along(Touch<L>& touch, std::span<const Vec3> path) {
 
 /// Work on a hand that is led once around a closed path (J), trapezoid rule; from its highest point on, which is to be
 /// outside.
-template <class L>
-double loop_work(Touch<L>& touch, std::vector<Vec3> loop) {
+template <class T>
+double loop_work(T& touch, std::vector<Vec3> loop) {
   const auto lower = [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); };
   std::rotate(loop.begin(), std::max_element(loop.begin(), loop.end(), lower), loop.end());
   const std::vector<Vec3> forces = forces_along(touch, loop);

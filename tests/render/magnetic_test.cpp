@@ -13,7 +13,9 @@ using implicit::forces_along;
 using implicit::largest_jump_on;
 using implicit::loop_work;
 using implicit::MagnetTouch;
+using implicit::WholeTouch;
 using implicit::PointTouch;
+using implicit::WholeTouch;
 using implicit::surface_of;
 using test::stiffness;
 
@@ -203,7 +205,7 @@ TEST(Magnetic, ChangesOfStiffnessGiveNoMoreThanTheyTook) {
       const std::vector<Vec3> part = test::line(corners[i], corners[i + 1], 4000);
       path.insert(path.end(), part.begin(), part.end());
     }
-    MagnetTouch touch{surface, {formulation, band}, {}};
+    WholeTouch touch(MagnetTouch{surface, {formulation, band}, {}});
     return loop_work(touch, path);
   };
   const double printed = 1000.0 * band * band / 2.0;

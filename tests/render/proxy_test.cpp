@@ -231,7 +231,7 @@ RC_GTEST_PROP(ProxyInvariants, a_copied_state_replays_to_the_same_bits, (std::ui
     RC_ASSERT(again.flags.bits() == first[i].flags.bits());
   }
   RC_ASSERT(copy.proxy == state.proxy);
-  RC_ASSERT(copy.tank.level() == state.tank.level());
+  RC_ASSERT(copy.account.level() == state.account.level());
 }
 
 TEST(ProxyTogether, a_corner_of_three_meshes_holds_the_proxy_at_its_corner) {
@@ -318,7 +318,7 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
     touch(before, state, Vec3(1e-3, 0.0, 2e-3));
     touch(before, state, probe);
     const double stored = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
-    const double tank = state.tank.level();
+    const double tank = state.account.level();
     const ForceSample felt = touch(after, state, probe);
     const double stretch = (felt.proxy - probe).norm();
     const double now = 0.5 * felt.wrench.force.norm() * stretch;
@@ -332,7 +332,7 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
     touch(before, state, Vec3(1e-3, 0.0, 2e-3));
     for (int i = 0; i < 4000; ++i) touch(before, state, probe + Vec3(5e-3 * std::sin(0.01 * i), 0.0, 0.0));
     touch(before, state, probe);
-    const double tank = state.tank.level();
+    const double tank = state.account.level();
     EXPECT_GT(tank, 1e-3);
     ForceSample felt;
     // Handed over within 10 ms.
@@ -340,7 +340,7 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
       felt = touch(after, state, probe);
       EXPECT_FALSE(felt.flags.has(TickFlag::energy_limited));
     }
-    EXPECT_LT(state.tank.level(), tank);
+    EXPECT_LT(state.account.level(), tank);
     EXPECT_NEAR(felt.wrench.force.norm(), 3.0 * stiffness * (felt.proxy - probe).norm(), 1e-9);
   }
 }
@@ -358,7 +358,7 @@ TEST(ProxyEnergy, a_relief_that_rises_over_a_resting_probe_gives_no_more_than_wa
   touch(before, state, Vec3(1e-3, 2e-3, 5e-3));
   touch(before, state, probe);
   const double stored = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
-  const double tank = state.tank.level();
+  const double tank = state.account.level();
   double most = 0.0;
   for (int i = 0; i < 20; ++i) {
     const ForceSample felt = touch(after, state, probe);

@@ -16,6 +16,7 @@ using implicit::forces_along;
 using implicit::largest_jump_on;
 using implicit::loop_work;
 using implicit::PointTouch;
+using implicit::WholeTouch;
 using implicit::surface_of;
 using test::stiffness;
 
@@ -456,7 +457,7 @@ TEST(VirtualContactPoint, BeyondTheBandItHoldsWithoutGivingEnergy) {
   Rng rng(3);
   double taken = 0.0;
   for (int n = 0; n < 8; ++n) {
-    PointTouch again{thin_band, with(Formulation::consistent), {}};
+    WholeTouch again(PointTouch{thin_band, with(Formulation::consistent), {}});
     const std::vector<Vec3> loop = test::random_loop(rng, Vec3(half, 0.0, half - 5e-3), 0.014, 0.008, 40000);
     const double given = loop_work(again, loop);
     EXPECT_LT(given, 1e-5) << n;
@@ -474,7 +475,7 @@ TEST(VirtualContactPoint, HeldUnderAHigherPartItGivesNoMoreThanItTook) {
   Box bounds;
   bounds.lower = Vec3(-0.03, -0.015, -0.015);
   bounds.upper = Vec3(0.03, 0.015, 0.035);
-  PointTouch touch{surface_of(test::sparse_grid(step_distance, bounds, voxel, 5e-3, 5e-3)), {}, {}};
+  WholeTouch touch(PointTouch{surface_of(test::sparse_grid(step_distance, bounds, voxel, 5e-3, 5e-3)), {}, {}});
   const std::array<Vec3, 5> corners = {Vec3(-0.012, 0.0, 0.038), Vec3(-0.012, 0.0, 0.008), Vec3(0.015, 0.0, 0.008),
                                        Vec3(0.015, 0.0, 0.038), Vec3(-0.012, 0.0, 0.038)};
   std::vector<Vec3> path;
@@ -537,7 +538,8 @@ TEST(VirtualContactPoint, MaterialIsLookedUpAtTheContact) {
 }
 
 /// Work (J) on a hand that presses at x = from, slides to x = to at a depth of 1 mm and lets go there.
-double slide_work(PointTouch& touch, double from, double to) {
+template <class T>
+double slide_work(T& touch, double from, double to) {
   std::vector<Vec3> path = test::line({from, 0.0, half + 1e-4}, {from, 0.0, half - 1e-3}, 2000);
   const auto append = [&path](const std::vector<Vec3>& more) { path.insert(path.end(), more.begin(), more.end()); };
   append(test::line({from, 0.0, half - 1e-3}, {to, 0.0, half - 1e-3}, 8000));
@@ -557,8 +559,9 @@ TEST(VirtualContactPoint, ChangesOfStiffnessGiveNoMoreThanTheyTook) {
   PointTouch printed{surface, with(Formulation::literal), {}};
   EXPECT_NEAR(slide_work(printed, -5e-3, 5e-3), 0.5e-3, 1e-5);  // (1500 - 500) / 2 (1 mm)²
   for (const double friction : {0.0, 0.01}) {
-    PointTouch ours{surface, with(Formulation::consistent), {}};
-    ours.material.static_friction = ours.material.dynamic_friction = friction;
+    PointTouch law{surface, with(Formulation::consistent), {}};
+    law.material.static_friction = law.material.dynamic_friction = friction;
+    WholeTouch ours(law);
     EXPECT_LT(slide_work(ours, -5e-3, 5e-3), 1e-6);
     // What the way back takes pays for the next way there.
     const double taken = slide_work(ours, 5e-3, -5e-3);
@@ -572,7 +575,7 @@ TEST(VirtualContactPoint, ChangesOfStiffnessGiveNoMoreThanTheyTook) {
 
 TEST(VirtualContactPoint, RandomLoopsOverChangingStiffnessGiveNoEnergy) {
   Rng rng(21);
-  PointTouch ours{half_soft(), with(Formulation::consistent), {}};
+  WholeTouch ours(PointTouch{half_soft(), with(Formulation::consistent), {}});
   double total = 0.0;
   for (int n = 0; n < 12; ++n) {
     const std::vector<Vec3> loop = test::random_loop(rng, Vec3(0.0, 0.0, half - 0.2e-3), 4e-3, 1.5e-3, 4000);

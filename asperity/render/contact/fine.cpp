@@ -152,74 +152,24 @@ void add_printed_texture(const TextureSample& texture, LawForce& law) noexcept {
   law.height = texture.height;
 }
 
-/// What the contact may still give (0 to 1) of a force: it is the slope of one potential, but a foot that jumps, a
-/// relief below, or a share that changes with speed would let it give more than it took.
-double giving(double book, const Vec3& force, double stiffness, const Vec3& moved) noexcept {
-  constexpr double free_credit = 1e-6;  // J
-  constexpr double changeover = 0.1;    // cosine between force and motion over which taking turns into giving
-  const double done = force.dot(moved);
-  if (book >= 0.0 || done <= 0.0) return 1.0;
-  // A force held over a tick is off by this much by itself.
-  const double credit = free_credit + 0.5 * stiffness * moved.squaredNorm();
-  const double share = std::clamp(2.0 + book / credit, 0.0, 1.0);
-  const double along = std::min(1.0, done / (changeover * force.norm() * moved.norm()));
-  return 1.0 - along * (1.0 - share);
-}
-
-/// Books what the relief gave over the last tick beyond what its potential lost, by the trapezoid: what the field
-/// itself gives, not what holding a force over a tick adds. `force`, `potential`, `penetration` as TextureState has
-/// them.
-void keep_book(const Vec3& force, double potential, double penetration, const Vec3& moved,
-               TextureState& state) noexcept {
-  constexpr double most_credit = 1e-5;  // J
-  double before = state.penetration;
-  if (!state.held) {
-    if (!(penetration > 0.0) || moved.isZero(0.0)) return;
-    // Where the relief's own slope says that it came from. Out of contact it cannot have been in contact: if the slope
-    // says so, what it holds now was never put in.
-    before = penetration + force.dot(moved) * penetration / (2.0 * potential);
-    if (before <= 0.0) return;
-  }
-  // The part of the motion during which the relief was touched.
-  double touched = 1.0;
-  if (before <= 0.0) touched = penetration > 0.0 ? penetration / (penetration - before) : 0.0;
-  if (penetration <= 0.0) touched = before > 0.0 ? before / (before - penetration) : 0.0;
-  const double gave = 0.5 * touched * (state.force + force).dot(moved) + potential - state.potential;
-  state.book = std::min(most_credit, state.book - gave);
-}
-
 /// Slope of k p^2 / 2 with p the penetration to the relief, whose crests lie on the surface. False: the relief is not
 /// touched.
-bool add_relief_texture(const TextureSample& texture, double highest, double stiffness, const Vec3& moved,
-                        TextureState& state, LawForce& law) noexcept {
+bool add_relief_texture(const TextureSample& texture, double highest, double stiffness, LawForce& law) noexcept {
   const double depth = law.push / stiffness;
   const double penetration = depth + std::min(0.0, texture.height - highest);
   law.height = texture.height - highest;
-  if (!(penetration > 0.0)) {
-    keep_book(Vec3::Zero(), 0.0, penetration, moved, state);
-    state.held = true;
-    state.force = Vec3::Zero();
-    state.potential = 0.0;
-    state.penetration = penetration;
-    return false;
-  }
+  if (!(penetration > 0.0)) return false;
   const double push = stiffness * penetration;
   const Vec3 slope = at_probe(surface_gradient(texture.gradient, law.normal), law, depth);
   const Vec3 relief = push * (law.normal - slope);
-  const double potential = 0.5 * push * penetration;
-  keep_book(relief, potential, penetration, moved, state);
-  const double share = giving(state.book, relief, stiffness, moved);
-  if (share < 1.0) state.book += 0.5 * (1.0 - share) * relief.dot(moved);
-  state.held = true;
-  state.force = share * relief;
-  state.potential = potential;
-  state.penetration = penetration;
-  law.texture = share * relief - law.push * law.normal;
+  law.spring += relief - law.push * law.normal;
+  law.stiffness = stiffness * (1.0 + slope.squaredNorm());
+  law.texture = relief - law.push * law.normal;
   law.force += law.texture;
   // Damping was measured against the constraint's whole push.
   const double along = law.force.dot(law.normal);
   if (along < 0.0) law.force -= along * law.normal;
-  law.push = share * push;
+  law.push = push;
   law.penetration = penetration;
   return true;
 }
@@ -232,7 +182,7 @@ const ReliefSurface* lay_of(const Instance& instance) noexcept {
 }
 
 /// Coefficients of a place, and across which direction they are largest.
-void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal, TextureState& state,
+void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal, Vec3& last_across,
                     FrictionCoefficients& coefficients) noexcept {
   const FineSettings& settings = fine.settings();
   double factor = 1.0;
@@ -255,8 +205,8 @@ void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const 
   // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
   const Vec3 way = surface_gradient(axis.x() * place.du + axis.y() * place.dv, normal);
   const double length = way.norm();
-  if (length > 0.0) state.across = way / length;
-  const Vec3 kept = surface_gradient(state.across, normal);
+  if (length > 0.0) last_across = way / length;
+  const Vec3 kept = surface_gradient(last_across, normal);
   const double rest = kept.norm();
   if (axis.isZero()) axis = Vec2::UnitX();
   const Vec2 aside(-axis.y(), axis.x());
@@ -272,7 +222,7 @@ void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const 
 }
 
 void add_friction(const Touched& touch, const Material& material, double stiffness, const MappedPlaces& places,
-                  const FineMotion& motion, EnergyTank& tank, LawForce& law) noexcept {
+                  const FineMotion& motion, LawForce& law) noexcept {
   const Instance& instance = *touch.instance;
   OfLaw& held = touch.contact->law;
   FrictionContact contact;
@@ -286,7 +236,7 @@ void add_friction(const Touched& touch, const Material& material, double stiffne
   coefficients.still = std::max(material.static_friction, material.dynamic_friction);
   coefficients.sliding = material.dynamic_friction;
   if (const FineFeatures* fine = instance.fine.get(); fine != nullptr && fine->shapes_friction() && !places.empty())
-    shape_friction(*fine, places, law.normal, held.texture, coefficients);
+    shape_friction(*fine, places, law.normal, held.across, coefficients);
   if (const ReliefSurface* relief = lay_of(instance)) {
     double strength = 0.0;
     const Vec3 along = mapped_lay(
@@ -298,10 +248,8 @@ void add_friction(const Touched& touch, const Material& material, double stiffne
       coefficients.still_ratio = coefficients.sliding_ratio = 1.0 - strength;
     }
   }
-  const double before = friction_energy(held.friction);
   const Vec3 force = friction_force(material.friction, contact, held.friction);
   law.held = friction_energy(held.friction);
-  tank.fill(before - law.held - force.dot(motion.moved));
   law.friction = force;
   law.force += force;
 }
@@ -311,14 +259,6 @@ bool resists(const Instance& instance, const Material& material) noexcept {
   const FrictionLaw& law = material.friction;
   return material.static_friction > 0.0 || material.dynamic_friction > 0.0 || law.viscosity > 0.0 ||
          law.break_away > 0.0 || (instance.fine != nullptr && instance.fine->interlocks());
-}
-
-/// What was given stays on the book: a debt is not forgotten by lifting off.
-void leave_fine_contact(OfLaw& held) noexcept {
-  held.friction = {};
-  held.texture.held = false;
-  held.texture.force = Vec3::Zero();
-  held.texture.potential = 0.0;
 }
 
 }  // namespace
@@ -338,11 +278,11 @@ bool adds_friction(const Instance& instance) noexcept {
 }
 
 bool add_fine_forces(const Touched& touch, const Material& material, bool friction, double stiffness,
-                     const FineMotion& motion, EnergyTank& tank, LawForce& law) noexcept {
+                     const FineMotion& motion, LawForce& law) noexcept {
   const Instance& instance = *touch.instance;
   OfLaw& held = touch.contact->law;
   if (!law.contact || !(law.push > 0.0)) {
-    leave_fine_contact(held);
+    held.friction = {};
     return false;
   }
   MappedPlaces places;
@@ -372,7 +312,7 @@ bool add_fine_forces(const Touched& touch, const Material& material, bool fricti
       faded = texture.faded;
       if (literal) {
         add_printed_texture(texture, law);
-      } else if (!add_relief_texture(texture, highest, stiffness, motion.moved, held.texture, law)) {
+      } else if (!add_relief_texture(texture, highest, stiffness, law)) {
         // In a valley of the relief: nothing is touched.
         held.friction = {};
         law.contact = false;
@@ -380,7 +320,7 @@ bool add_fine_forces(const Touched& touch, const Material& material, bool fricti
       }
     }
   }
-  if (friction && resists(instance, material)) add_friction(touch, material, stiffness, places, motion, tank, law);
+  if (friction && resists(instance, material)) add_friction(touch, material, stiffness, places, motion, law);
   return faded;
 }
 

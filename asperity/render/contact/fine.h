@@ -23,7 +23,7 @@ struct FineMotion {
 /// normal. Forgets what it knew where there is no contact. True where a texture was felt weaker than it is. `friction`:
 /// what adds_friction answers; `stiffness`: of the contact's spring (N/m). [servo]
 bool add_fine_forces(const Touched& touch, const Material& material, bool friction, double stiffness,
-                     const FineMotion& motion, EnergyTank& tank, LawForce& law) noexcept;
+                     const FineMotion& motion, LawForce& law) noexcept;
 
 /// What of an instance's texture and friction cannot be felt on its surface or by its law. Errors: unsupported_pair.
 /// [build]

@@ -524,8 +524,13 @@ LawForce owner_force(const Touched& touch, const Material& material, std::size_t
       rest -= active.multiplier * solution.planes[active.plane].normal;
     answer.force += material.stiffness * rest;
   }
+  answer.spring = answer.force;
   if (const auto* law = std::get_if<ForceShadingLaw>(&touch.instance->law)) shade(touch, *law, plane->contact, answer);
-  if (strongest == strongest_of_all) answer.force += material.stiffness * (goal - probe.pose.position);
+  if (strongest == strongest_of_all) {
+    const Vec3 friction = material.stiffness * (goal - probe.pose.position);
+    answer.force += friction;
+    answer.spring += friction;
+  }
   answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
   answer.point = touch.to_world(plane->contact.point);
   answer.element = plane->contact.element;

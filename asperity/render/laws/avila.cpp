@@ -38,7 +38,9 @@ LawForce consistent_force(const AvilaLaw& law, const IsoView& view, double band,
   const double share = depth / band;
   answer.contact = true;
   answer.normal = view.sigma * jet.gradient / slope;
-  answer.force = law.largest_force * share * answer.normal - law.retarding * (1.0 + share) * velocity;
+  answer.spring = law.largest_force * share * answer.normal;
+  answer.stiffness = law.largest_force * slope / band;
+  answer.force = answer.spring - law.retarding * (1.0 + share) * velocity;
   answer.penetration = depth / slope;
   answer.point = probe + answer.penetration * answer.normal;
   return answer;

@@ -321,7 +321,9 @@ LawForce consistent_force(const CrossUncrossLaw& law, const IsoView& view, doubl
   }
   LawForce answer;
   answer.contact = true;
-  answer.force = stiffness * (state.point - probe) - law.retarding * velocity;
+  answer.spring = stiffness * (state.point - probe);
+  answer.stiffness = stiffness;
+  answer.force = answer.spring - law.retarding * velocity;
   answer.point = state.point;
   answer.normal = state.normal;
   answer.penetration = (state.point - probe).norm();

@@ -16,13 +16,15 @@ struct LawForce {
   double penetration = 0.0;    ///< m
   double height = 0.0;         ///< relief height under the probe (m)
   std::uint32_t element = no_index;
-  bool damped = false;           ///< damping is part of the force already
+  Vec3 spring = Vec3::Zero();    ///< N, the part of the force that is held: neither damping nor friction
+  double stiffness = 0.0;        ///< N/m: by how much that changes; 0: the material's
+  bool damped = false;           ///< damping is part of the force already, and `spring` is told
   double push = 0.0;             ///< N along the normal, before damping: what friction and texture go by
   Vec3 friction = Vec3::Zero();  ///< N, the part of the force that is friction
   Vec3 texture = Vec3::Zero();   ///< N, the part that is texture
   bool pulls = false;            ///< a sticky surface holds the probe back: `penetration` is how far it was drawn off
   double held = 0.0;             ///< J, in the spring of a friction law
-  Vec3 turn = Vec3::Zero();      ///< N, lateral force of consistent shading, to be added as far as its budget lets it
+  Vec3 turn = Vec3::Zero();      ///< N, lateral force of consistent shading, to be added as far as it is paid
   bool bends = false;            ///< `bend` is known
   Mat3 bend;                     ///< 1/m: how the normal changes along the surface (shape operator)
 };

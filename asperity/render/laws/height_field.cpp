@@ -123,7 +123,8 @@ LawForce potential_contact(double value, const Vec3& gradient, double height, st
   const double steepness = gradient.norm();
   if (!contact.seen_outside || steepness == 0.0) return answer;
   answer.contact = true;
-  answer.force = -stiffness * value * gradient;
+  answer.force = answer.spring = -stiffness * value * gradient;
+  answer.stiffness = stiffness * steepness * steepness;
   answer.normal = gradient / steepness;
   answer.penetration = -value;
   answer.point = probe - value / steepness * answer.normal;

@@ -29,7 +29,6 @@ double friction_of(const Material& material, double depth_gain, double depth) no
 
 void leave_contact_point(Held& state) noexcept {
   state.pushed = false;
-  state.stiffness = 0.0;
   state.normal = Vec3::Zero();
 }
 
@@ -222,10 +221,9 @@ struct Trust {
   [[nodiscard]] double at(double g) const noexcept { return std::clamp((g + depth) / fade + 1.0, 0.0, 1.0); }
 };
 
-/// What the potential says at the probe. Force = stiffness pull, and pull = -grad energy where `trust` is 1.
+/// What the potential says at the probe. Force = stiffness pull, the slope of an energy where `trust` is 1.
 struct Spring {
   Vec3 pull = Vec3::Zero();  ///< m
-  double energy = 0.0;       ///< m²; 0 far outside
   double trust = 1.0;
   Vec3 foot = Vec3::Zero();  ///< of the surface that is felt
 };
@@ -255,52 +253,14 @@ Spring spring_at(const Felt& felt, const Trust& trust, double band, const Potent
     const double share = g / band;
     const double window = 1.0 - share * share;
     spring.pull = -g * window * window * here.gradient;
-    spring.energy = -band * band / 6.0 * window * window * window;
     return spring;
   }
   spring.pull = -g * here.gradient;
-  const double depth = std::min(-g, trust.depth);
-  spring.energy = 0.5 * depth * depth - band * band / 6.0;
   if (spring.trust < 1.0) {
     spring.pull = spring.trust * spring.pull + (1.0 - spring.trust) * trust.depth * state.normal;
     spring.foot = probe + spring.pull;
   }
   return spring;
-}
-
-// Budget of energy that was taken and may be given back (J), and what is too little to be counted.
-constexpr double most_budget = 10e-3;
-constexpr double free_energy = 1e-12;
-
-/// Beyond the band the held force is no potential's slope. What it gives the hand there (J) is paid from the budget,
-/// what it takes fills it; the rest is paid by softening the spring. False: even that cannot pay it.
-bool pay_for_hold(const Spring& spring, const Vec3& probe, Held& state) noexcept {
-  double& stiffness = state.stiffness;
-  const double given = stiffness * (state.point - state.previous).dot(probe - state.previous);
-  state.budget = std::min(state.budget - given, most_budget);
-  if (state.budget >= 0.0) return true;
-  const double owed = -state.budget;
-  state.budget = 0.0;
-  if (!(owed < stiffness * spring.energy)) return false;
-  stiffness -= owed / spring.energy;
-  return true;
-}
-
-/// The stiffness that may be felt: `here`, unless the contact's energy (`energy` by stiffness, m²) would rise by more
-/// than the budget.
-double felt_stiffness(double here, double energy, Held& state) noexcept {
-  double& felt = state.stiffness;
-  if (felt == 0.0) felt = here;
-  if (felt == here) return felt;
-  const double cost = (here - felt) * energy;
-  if (cost <= state.budget + free_energy) {
-    felt = here;
-    state.budget = std::clamp(state.budget - cost, 0.0, most_budget);
-  } else {
-    felt += state.budget / energy;
-    state.budget = 0.0;
-  }
-  return felt;
 }
 
 /// How far along `way` (unit) from the probe, which is inside by `start`, the surface lies; `guess` if it is not found.
@@ -399,17 +359,11 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   const bool drags = material.dynamic_friction > 0.0 && !material.friction_named && !outside;
   Vec3 point = spring.foot;
   Vec3 pull = spring.pull;
-  double energy = spring.energy;
-  bool held = !(spring.trust < 1.0 && normal.isZero());
+  const bool held = !(spring.trust < 1.0 && normal.isZero());
   if (drags) {
     point = dragged(felt, surface.grid().voxel(), friction_of(material, rule.depth_gain, spring.pull.norm()), dt,
                     spring, here.value, probe, state);
     pull = point - probe;
-    energy = 0.5 * pull.squaredNorm() - rule.band * rule.band / 6.0;
-  } else if (spring.trust < 1.0 && state.pushed) {
-    Potential before;
-    if (felt.at(state.previous, state.cache, before) && trust.at(before.value) < 1.0)
-      held = held && pay_for_hold(spring, probe, state);
   }
   state.previous = probe;
   if (!held) {
@@ -418,7 +372,6 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
     state.seen_outside = false;
     return {};
   }
-  const double stiffness = felt_stiffness(material.stiffness, energy, state);
   state.pushed = !outside;
   state.point = point;
   LawForce answer;
@@ -428,7 +381,11 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   answer.point = point - rule.offset * normal;
   // Of a force that is an energy's slope, the depth that the energy goes by.
   answer.penetration = !drags && spring.trust == 1.0 ? -here.value : pull.norm();
-  answer.force = stiffness * pull;
+  answer.force = answer.spring = material.stiffness * pull;
+  // Of the energy k g^2 / 2 that the force is the slope of.
+  constexpr double least_slope = 1e-3;
+  const bool slope = !drags && spring.trust == 1.0 && !outside;
+  answer.stiffness = material.stiffness * (slope ? std::max(here.gradient.squaredNorm(), least_slope) : 1.0);
   answer.push = outside ? 0.0 : answer.force.dot(normal);
   if (rule.band > 0.0) {
     answer.force += magnet_damping(here.value, rule.band, material.damping, normal, velocity);

@@ -5,7 +5,6 @@
 #include "asperity/render/contact/level.h"
 #include "asperity/render/custom_law.h"
 #include "asperity/render/local_material.h"
-#include "asperity/render/stages/limits.h"
 #include "asperity/render/stages/tick.h"
 
 namespace asperity {
@@ -112,35 +111,81 @@ FineMotion motion_over(const Tick& tick, const Touched& touch) noexcept {
 void to_world(const Touched& touch, LawForce& law) noexcept {
   if (touch.at_origin) return;
   law.force = touch.turned(law.force);
+  law.spring = touch.turned(law.spring);
   law.friction = touch.turned(law.friction);
   law.texture = touch.turned(law.texture);
   law.point = touch.to_world(law.point);
   law.normal = touch.turned(law.normal);
 }
 
-/// Whether a law's own changes are paid for: not those of volumes, which have budgets of their own, nor what is felt as
-/// printed.
-bool pays(const Instance& instance) noexcept {
-  if (iso_of(instance.surface) != nullptr) return false;
-  if (const auto* law = std::get_if<HeightFieldLaw>(&instance.law)) return law->formulation != Formulation::literal;
-  if (const auto* law = std::get_if<MesostructureLaw>(&instance.law)) return law->formulation != Formulation::literal;
-  return false;
+/// What makes a contact hold more than was put into it.
+Giver cause_of(const Tick& tick, const Touched& touch, const HeldForce& held, double stiffness) noexcept {
+  if (tick.changed) return Giver::change;
+  if (touch.moved) return Giver::motion;
+  if (tick.surfaces_moved && touch.facts->volume) return Giver::level;
+  if (std::holds_alternative<std::shared_ptr<const CustomLaw>>(touch.instance->law)) return Giver::custom;
+  return held.stiffness > 0.0 && stiffness > held.stiffness ? Giver::stiffness : Giver::spring;
 }
 
-double potential_of(const LawForce& law, double stiffness) noexcept {
-  return law.contact ? 0.5 * stiffness * law.penetration * law.penetration : 0.0;
+double stiffness_of(const LawForce& law, const Material& material) noexcept {
+  return law.stiffness > 0.0 ? law.stiffness : material.stiffness;
 }
 
-/// Takes back what a surface would give by moving, beside what its law holds.
-void limit_drag(Tick& tick, const Touched& touch, const Vec3& point, LawForce& law) noexcept {
-  if (!touch.moved || (law.friction.isZero(0.0) && law.texture.isZero(0.0))) return;
-  // Where in the world the surface's point there has come from within the tick.
-  const Vec3 motion = point - touch.before->apply(touch.to_local(point));
-  const double share = carried_share(law.friction + law.texture, motion, tick.state.tank);
+/// Tells that less is rendered than there would be; what is rounding is not told.
+void tell(Tick& tick, double share) noexcept {
+  constexpr double rounding = 1e-6;
+  tick.limited = tick.limited || share < 1.0 - rounding;
+}
+
+/// Renders a share of what a contact pushes with, and of the friction and texture that go by it.
+void soften(Tick& tick, double share, LawForce& law) noexcept {
   if (share >= 1.0) return;
-  law.force -= (1.0 - share) * (law.friction + law.texture);
+  tell(tick, share);
+  law.force *= share;
+  law.spring *= share;
   law.friction *= share;
   law.texture *= share;
+  law.turn *= share;
+}
+
+/// Pays for all that a contact gives beside its spring, which is paid for already. World frame.
+void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
+  if (touch.facts->printed) return;
+  EnergyAccount& account = tick.state.account;
+  Contact& contact = *touch.contact;
+  const Instance& instance = *touch.instance;
+  const Vec3 ahead = tick.ahead();
+  Vec3 loose = law.force - law.spring;
+  // Of a friction law: its spring, and what only ever takes, unless the surface carries the hand along.
+  const FrictionState& friction = contact.law.friction;
+  const bool printed = instance.material.friction.formulation == Formulation::literal;
+  if (law.contact && friction.stiffness > 0.0 && !printed) {
+    const Vec3 spring = -friction.stiffness * touch.turned(friction.stretch);
+    loose -= spring;
+    const double share =
+        account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, spring, friction.stiffness);
+    if (share < 1.0) {
+      tell(tick, share);
+      law.force -= (1.0 - share) * spring;
+      law.friction -= (1.0 - share) * spring;
+    }
+  } else {
+    account.release(contact.drag);
+  }
+  if (!law.turn.isZero(0.0)) {
+    const double share = account.spend(Giver::shading, law.turn, ahead);
+    law.turn *= share;
+    law.force += law.turn;
+  }
+  if (printed) loose -= law.friction;
+  if (instance.fine != nullptr && instance.fine->settings().formulation == Formulation::literal) loose -= law.texture;
+  if (touch.moved) {
+    const double share = account.spend(Giver::motion, loose, ahead);
+    law.force -= (1.0 - share) * loose;
+    law.friction *= share;
+  } else {
+    account.take(loose);
+  }
 }
 
 /// World frame.
@@ -150,32 +195,47 @@ void add_viscosity(double viscosity, const Vec3& velocity, LawForce& law) noexce
   law.force -= viscosity * velocity;
 }
 
-/// Pays for what a change of the surface, or of its stiffness, would add to a law's energy, and renders what is paid.
-/// Object frame. `previous`: the probe at the last tick.
-LawForce paid_force(Tick& tick, const Touched& touch, const Material& material, const Vec3& position,
-                    const Vec3& previous, const FineMotion& motion) noexcept {
-  PotentialMemory& memory = touch.contact->memory<PotentialMemory>();
-  EnergyTank& tank = tick.state.tank;
-  const bool stands = !tick.changed && !touch.moved;
-  if (memory.potential && !stands) {
-    Contact there = *touch.contact;
-    Touched before = touch;
-    before.contact = &there;
-    pay_for_change(potential_of(ask(before, material, previous, motion.velocity, tick.dt), material.stiffness), memory,
-                   tank);
+/// Pays for a law without a proxy.
+void settle_law(Tick& tick, const Touched& touch, const Material& material, LawForce& law) noexcept {
+  if (touch.facts->printed) return;
+  EnergyAccount& account = tick.state.account;
+  HeldForce& held = touch.contact->push;
+  const double stiffness = stiffness_of(law, material);
+  if (law.contact && !law.spring.isZero(0.0)) {
+    const Giver cause = cause_of(tick, touch, held, stiffness);
+    soften(tick, account.hold(cause, held, law.spring, stiffness), law);
+  } else {
+    account.release(held);
   }
-  LawForce law = ask(touch, material, position, motion.velocity, tick.dt);
-  if (!law.contact) memory.share = 1.0;
-  if (stands && law.contact && memory.potential && memory.stiffness > 0.0 && memory.stiffness != material.stiffness) {
-    // A stiffer place under the same depth holds more.
-    memory.potential = memory.share * potential_of(law, memory.stiffness);
-    pay_for_change(potential_of(law, material.stiffness), memory, tank);
+  settle_loose(tick, touch, law);
+}
+
+/// Pays for the proxy: what its parts hold together, then the rest of each.
+void settle_parts(Tick& tick) noexcept {
+  EnergyAccount& account = tick.state.account;
+  HeldForce& held = tick.state.spring;
+  const Part* strongest = nullptr;
+  Vec3 spring = Vec3::Zero();
+  double stiffness = 0.0;
+  for (const Part& part : tick.parts) {
+    if (!part.law.contact) continue;
+    spring += part.law.spring;
+    const double own = part.law.stiffness > 0.0 ? part.law.stiffness : part.stiffness;
+    if (own > stiffness) strongest = &part;
+    stiffness = std::max(stiffness, own);
   }
-  memory.stiffness = law.contact ? material.stiffness : 0.0;
-  memory.potential = memory.share * potential_of(law, material.stiffness);
-  law.force *= memory.share;
-  tick.limited = tick.limited || memory.share < 1.0;
-  return law;
+  double share = 1.0;
+  if (strongest != nullptr) {
+    Giver cause = cause_of(tick, *strongest->touch, held, stiffness);
+    for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
+    share = account.hold(cause, held, spring, stiffness);
+  } else {
+    account.release(held);
+  }
+  for (Part& part : tick.parts) {
+    soften(tick, share, part.law);
+    settle_loose(tick, *part.touch, part.law);
+  }
 }
 
 /// A law without a proxy, with friction and texture.
@@ -192,8 +252,7 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   // A probe that enters within one tick was outside at the last one: ask there first.
   const bool fresh = volume ? !contact.asked : !contact.seen_outside;
   if (fresh && !tick.first) ask(touch, material, previous, motion.velocity, tick.dt);
-  LawForce law = pays(instance) ? paid_force(tick, touch, material, position, previous, motion)
-                                : ask(touch, material, position, motion.velocity, tick.dt);
+  LawForce law = ask(touch, material, position, motion.velocity, tick.dt);
   contact.touching = law.contact;
   // What it is held to goes along with a surface that changes.
   contact.surface.rests = law.contact && !contact.surface.places.empty();
@@ -201,6 +260,8 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
     if (volume) law.element = element_at(instance, contact.surface.level, law.point, *touch.cache);
     if (!law.damped) {
       law.push = law.force.dot(law.normal);
+      // What resists by its speed is told apart by those that do.
+      if (law.stiffness == 0.0 && law.spring.isZero(0.0)) law.spring = law.force;
       // Against the hand's own motion: damping by a surface that moves would drag the hand along.
       law.force = with_damping(law.force, law.normal, touch.turned_back(tick.probe->twist.linear), material.damping);
     }
@@ -208,12 +269,11 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   const bool adds = touch.facts->adds_friction;
   if (instance.fine != nullptr || adds) {
     const Material felt = elsewhere ? local_material(touch, law.point) : material;
-    if (add_fine_forces(touch, felt, adds, felt.stiffness, motion, tick.state.tank, law))
-      tick.out.flags.set(TickFlag::texture_faded);
+    if (add_fine_forces(touch, felt, adds, felt.stiffness, motion, law)) tick.out.flags.set(TickFlag::texture_faded);
   }
   to_world(touch, law);
   add_viscosity(material.viscosity, velocity_over(tick, touch), law);
-  limit_drag(tick, touch, tick.probe->pose.position, law);
+  settle_law(tick, touch, material, law);
   add_contact(tick, touch, law);
   if (law.contact) shadow = law.point;
 }
@@ -229,15 +289,15 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   const Material& local = mapped ? material_there(touch, touch.to_local(law.point), room) : instance.material;
   if (local.viscosity > 0.0) add_viscosity(local.viscosity, velocity_over(tick, touch), law);
   if (!adds && instance.fine == nullptr) {
-    limit_drag(tick, touch, law.point, law);
     if (law.contact && instance.material.static_friction > 0.0 && touch.facts->holds_friction)
       law.friction = law.force - law.force.dot(law.normal) * law.normal;
     return;
   }
-  const double stiffness = tick.proxy_share * part.stiffness;
+  const double stiffness = part.stiffness;
   law.push = law.pulls ? 0.0 : stiffness * law.penetration;
   if (!touch.at_origin) {
     law.force = touch.turned_back(law.force);
+    law.spring = touch.turned_back(law.spring);
     law.point = touch.to_local(law.point);
     law.normal = touch.turned_back(law.normal);
     law.friction = touch.turned_back(law.friction);
@@ -249,26 +309,18 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   const Vec3 kept = law.friction;
   law.friction = Vec3::Zero();
   const Material felt = implicit_of(instance.surface) != nullptr ? local_material(touch, law.point) : local;
-  if (add_fine_forces(touch, felt, adds, stiffness, motion_over(tick, touch), tick.state.tank, law))
+  if (add_fine_forces(touch, felt, adds, stiffness, motion_over(tick, touch), law))
     tick.out.flags.set(TickFlag::texture_faded);
   law.friction += kept;
   to_world(touch, law);
-  limit_drag(tick, touch, law.point, law);
 }
 
-/// What draws the probe to an instance, where something does. Owes what a change of the surface would add to it, and
-/// rests until the tank has paid.
+/// What draws the probe to an instance, where something does.
 void add_attraction(Tick& tick, Touched& touch) noexcept {
-  Contact& contact = *touch.contact;
-  if (tick.changed || touch.moved) {
-    const double now = attraction_at(touch, touch.to_local(tick.state.previous_probe)).potential;
-    contact.debt += std::max(0.0, now - contact.attraction);
-  }
-  contact.debt -= tick.state.tank.pay(contact.debt);
   const Attraction pull = attraction_at(touch, touch.to_local(tick.probe->pose.position));
-  contact.attraction = pull.potential;
-  if (contact.debt > 0.0 || pull.force.isZero(0.0)) return;
-  tick.out.wrench.force += touch.turned(pull.force);
+  if (pull.force.isZero(0.0)) return;
+  const Vec3 force = touch.turned(pull.force);
+  tick.out.wrench.force += tick.state.account.spend(Giver::attraction, force, tick.ahead()) * force;
   tick.out.flags.set(TickFlag::field_force);
 }
 
@@ -280,7 +332,7 @@ void add_effects(Tick& tick) noexcept {
     const Vec3 force = field_effect_force(effect, here, tick.probe->pose.position, tick.probe->twist.linear, cache);
     if (force.isZero()) continue;
     tick.out.flags.set(TickFlag::field_force);
-    tick.out.wrench.force += force;
+    tick.out.wrench.force += tick.state.account.spend(Giver::effect, force, tick.ahead()) * force;
   }
 }
 
@@ -291,8 +343,9 @@ void add(Tick& tick) noexcept {
   for (Touched& touch : tick.touches) {
     if (!touch.facts->constrains) add_law(tick, touch, shadow);
   }
-  for (Part& part : tick.parts) {
-    add_to_proxy(tick, part);
+  for (Part& part : tick.parts) add_to_proxy(tick, part);
+  settle_parts(tick);
+  for (const Part& part : tick.parts) {
     add_contact(tick, *part.touch, part.law);
     part.touch->contact->touching = part.law.contact;
   }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "asperity/render/stages/tick.h"
@@ -6,15 +7,12 @@ namespace asperity {
 
 namespace {
 
-/// Spreads the change of the force over the scene's hand-over time, as far as the tank pays.
+/// Spreads the change of the force over the scene's hand-over time, as far as it is paid for.
 Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
   ProxyState& state = tick.state;
   const bool new_scene = tick.changed && !tick.first;
   if (!new_scene && state.residual == Vec3::Zero()) return force;
   const double time = tick.scene.settings().handover.count();
-  const Vec3 moved = tick.probe->pose.position - state.previous_probe;
-  // What the last tick's share of the old force has given since.
-  state.tank.pay(state.residual.dot(moved));
   if (new_scene) state.residual = time > 0.0 ? Vec3(state.force - force) : Vec3(Vec3::Zero());
   if (state.residual.isZero(0.0)) return force;
   state.residual *= time > 0.0 ? std::exp(-tick.dt.count() / time) : 0.0;
@@ -23,11 +21,9 @@ Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
     state.residual = Vec3::Zero();
     return force;
   }
-  // It may give over the next tick what the tank holds: the hand moves as it did, or twice as far.
-  const double way = 2.0 * moved.norm() + 1e-7;
-  const double most = state.tank.level() / way;
-  const double size = state.residual.norm();
-  if (size > most) state.residual *= most / size;
+  // The hand moves as it did or is told to, or twice as far.
+  const double way = 2.0 * std::max(tick.moved.norm(), tick.ahead().norm()) + 1e-7;
+  state.residual *= state.account.spend_anywhere(Giver::handover, state.residual, way);
   return force + state.residual;
 }
 

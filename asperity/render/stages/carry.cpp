@@ -197,8 +197,9 @@ bool place_instances(Tick& tick) noexcept {
   return any;
 }
 
-/// Takes the proxy along with what it touches or is overtaken by. True where something has changed under it.
-bool follow_surfaces(Tick& tick) noexcept {
+/// Takes the proxy along with what it touches or is overtaken by (`overtaken`). True where something has changed under
+/// it.
+bool follow_surfaces(Tick& tick, bool& overtaken) noexcept {
   ProxyState& state = tick.state;
   bool any = place_instances(tick);
   if (!any && !tick.changed) return false;
@@ -231,10 +232,8 @@ bool follow_surfaces(Tick& tick) noexcept {
     surface.rests = false;
     if (touch.contact->outside) state.proxy = pushed_to_front(tick, touch, *touch.contact->outside, state.proxy);
   }
-  // A surface that overtakes a free probe gives it no more than the probe's own motion would have stored.
-  if (mover != nullptr && state.stiffness == 0.0) state.stiffness = mover->instance->material.stiffness;
+  overtaken = mover != nullptr;
   for (Touched& touch : tick.touches) {
-    const Instance& instance = *touch.instance;
     const std::optional<bool>& outside = touch.contact->outside;
     if (!touch.facts->constrains || &touch == mover || !outside || !(touch.moved || tick.changed)) continue;
     if (touch.facts->sides == Sides::front && !*outside) continue;
@@ -242,8 +241,7 @@ bool follow_surfaces(Tick& tick) noexcept {
     if (in_front(touch, local) == *outside || beside_rim(touch, local)) continue;
     state.proxy = pushed_to_front(tick, touch, *outside, state.proxy);
     touch.contact->surface.rests = false;
-    if (state.stiffness == 0.0) state.stiffness = instance.material.stiffness;
-    any = true;
+    overtaken = any = true;
   }
   return any;
 }
@@ -253,10 +251,11 @@ bool follow_surfaces(Tick& tick) noexcept {
 void carry(Tick& tick) noexcept {
   ProxyState& state = tick.state;
   const SceneSettings& settings = tick.scene.settings();
-  if (settings.change_power > 0.0) state.tank.fill(settings.change_power * tick.dt.count());
-  tick.surfaces_moved = follow_surfaces(tick);
+  if (settings.change_power > 0.0) state.account.fill(settings.change_power * tick.dt.count());
+  bool overtaken = false;
+  tick.surfaces_moved = follow_surfaces(tick, overtaken);
   // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
-  if (tick.changed && state.stiffness > 0.0) {
+  if (tick.changed && (overtaken || state.spring.stiffness > 0.0)) {
     for (const Touched& touch : tick.touches) {
       if (touch.facts->sides == Sides::front && touch.facts->constrains && !touch.contact->surface.rests)
         state.proxy = pushed_to_front(tick, touch, true, state.proxy);

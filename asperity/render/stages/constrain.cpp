@@ -28,23 +28,6 @@ Vec3 on_cone(const Vec3& force, const Vec3& normal, const Friction& friction, bo
   return length <= most ? force : Vec3(push * normal + (most / length) * along);
 }
 
-/// Adds consistent shading's lateral force as far as its budget goes: against the motion it is free and fills the
-/// budget, along the motion it spends it.
-void add_turn(ShadingMemory& memory, LawForce& law, const Vec3& moved) noexcept {
-  constexpr double full_budget = 1e-6;  // J from which on nothing is held back
-  constexpr double changeover = 0.1;    // cosine between force and motion over which the two cases blend
-  memory.budget -= memory.turned.dot(moved);
-  memory.turned = Vec3::Zero();
-  if (!law.contact || law.turn.isZero()) return;
-  const double size = law.turn.norm() * moved.norm();
-  const double cosine = size > 0.0 ? law.turn.dot(moved) / size : 0.0;
-  const double along = std::clamp(0.5 + 0.5 * cosine / changeover, 0.0, 1.0);
-  const double budget = std::clamp(memory.budget / full_budget, 0.0, 1.0);
-  const double giving = along * along * (3.0 - 2.0 * along);
-  memory.turned = (1.0 + giving * (budget - 1.0)) * law.turn;
-  law.force += memory.turned;
-}
-
 /// One surface touched by a point, or by a ball where the surface has one level further out for it. False, and nothing
 /// done, where more than one plane of a mesh may hold it.
 template <SurfaceView View>
@@ -91,7 +74,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   }
   law.penetration = spring.norm();
   law.pulls = rest.pulls;
-  law.force = material.stiffness * spring;
+  law.force = law.spring = material.stiffness * spring;
   law.point = tick.felt - radius * law.normal;
   if constexpr (requires { view.element(point.place(), point.spot()); }) {
     law.element = view.element(point.place(), point.spot());
@@ -107,11 +90,12 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   // Of the bare mesh under it, should the scene take the coat away.
   if constexpr (std::is_same_v<View, ReliefView>) surface.height = point.place().side() * view.surface().base().skin();
   if (!rest.pulls) {
-    law.force = with_damping(on_cone(law.force, law.normal, friction, surface.sliding), law.normal,
-                             tick.probe->twist.linear, material.damping);
+    // A law as printed has turned the force away from what the spring holds.
+    const bool turned = law.force != law.spring;
+    const Vec3 force = on_cone(law.force, law.normal, friction, surface.sliding);
+    law.spring = turned ? on_cone(law.spring, law.normal, friction, surface.sliding) : force;
+    law.force = with_damping(force, law.normal, tick.probe->twist.linear, material.damping);
   }
-  if (std::holds_alternative<ForceShadingLaw>(instance.law))
-    add_turn(touch.contact->memory<ShadingMemory>(), law, position - tick.state.previous_probe);
   if constexpr (requires { view.height(point.spot()); }) law.height = view.height(point.spot());
   if constexpr (requires { view.bend(point.place(), point.spot()); }) {
     if (instance.fine != nullptr) {
@@ -171,8 +155,6 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     const Material& material = material_there(touch, touch.to_local(solution.proxy), room);
     Part& part = *tick.parts.emplace_back();
     part = {&touch, owner_force(touch, material, i, solution, goal, *tick.probe), material.stiffness};
-    if (std::holds_alternative<ForceShadingLaw>(touch.instance->law))
-      add_turn(touch.contact->memory<ShadingMemory>(), part.law, position - state.previous_probe);
     joint.remember_places(i, solution);
     // One plane of one mesh: from there a point goes on by itself.
     OfSurface& surface = touch.contact->surface;
@@ -186,38 +168,6 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
 [[gnu::noinline]] void constrain_with_facets(Tick& tick) noexcept {
   GeneratedPatches patches;
   constrain_jointly(tick, &patches);
-}
-
-/// Keeps the spring between probe and proxy from gaining energy (formulation, amendment 6).
-void limit_energy(Tick& tick) noexcept {
-  ProxyState& state = tick.state;
-  const Vec3& probe = tick.probe->pose.position;
-  double stiffness = 0.0;
-  double strongest = 0.0;
-  for (const Part& part : tick.parts) {
-    if (!part.law.contact || part.law.penetration < strongest) continue;
-    strongest = part.law.penetration;
-    stiffness = part.stiffness;
-  }
-  if (stiffness > 0.0 && state.stiffness > 0.0) {
-    constexpr double rounding = 1e-9;
-    const double may = 0.5 * state.stiffness * (tick.held - probe).squaredNorm();
-    const double would = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
-    if (would > may * (1.0 + rounding)) {
-      const double paid = state.tank.pay(would - may);
-      if (paid < would - may) {
-        const double share = (may + paid) / would;
-        // Never all of it: a spring that is still held is not a free one.
-        stiffness *= std::max(share, 1e-12);
-        tick.limited = true;
-        tick.proxy_share = share;
-        for (Part& part : tick.parts) part.law.force *= share;
-      }
-    } else {
-      state.tank.fill(may - would);
-    }
-  }
-  state.stiffness = stiffness;
 }
 
 }  // namespace
@@ -234,7 +184,6 @@ void constrain(Tick& tick) noexcept {
   }
   if (count == 0) {
     tick.state.proxy = tick.felt = tick.probe->pose.position;
-    tick.state.stiffness = 0.0;
     return;
   }
   const bool point =
@@ -250,7 +199,6 @@ void constrain(Tick& tick) noexcept {
       constrain_jointly(tick, nullptr);
     }
   }
-  limit_energy(tick);
 }
 
 }  // namespace asperity

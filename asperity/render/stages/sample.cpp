@@ -18,18 +18,20 @@ bool same(const View& a, const View& b) noexcept {
   return a.zoom == b.zoom && a.focus == b.focus && a.home == b.home && a.orientation.coeffs() == b.orientation.coeffs();
 }
 
-/// Takes the state from the view of the last tick to this one. The spring and the forces stay what they are to the
-/// hand: `held` becomes where the proxy would have to be for that.
+/// Takes the state from the view of the last tick to this one: forces stay what they are to the hand.
 void adopt_view(const View& view, Tick& tick) noexcept {
   ProxyState& state = tick.state;
   const View last = state.view;
   state.view = view;
   if (same(last, view)) return;
-  const Vec3& now = tick.workspace.pose.position;
   const auto turn = [&](const Vec3& v) { return Vec3(view.orientation * (last.orientation.conjugate() * v)); };
   const double scale = last.zoom / view.zoom;
-  tick.held = view.to_scene(now) + scale * turn(state.proxy - last.to_scene(now));
-  state.stiffness /= scale * scale;
+  const auto turn_held = [&](HeldForce& held) {
+    held.force = turn(held.force) / scale;
+    held.stiffness /= scale * scale;
+  };
+  turn_held(state.spring);
+  state.account.turn([&](const Vec3& force) { return Vec3(turn(force) / scale); });
   state.force = turn(state.force) / scale;
   state.residual = turn(state.residual) / scale;
   state.previous_probe = view.to_scene(state.workspace_probe);
@@ -37,12 +39,9 @@ void adopt_view(const View& view, Tick& tick) noexcept {
     const auto turned = [&](const Vec3& v) { return contact.pose.rotate_inverse(turn(contact.pose.rotate(v))); };
     contact.law.friction.stretch = scale * turned(contact.law.friction.stretch);
     contact.law.friction.stiffness /= scale * scale;
-    contact.law.texture.force = turned(contact.law.texture.force) / scale;
-    contact.law.texture.penetration *= scale;
+    turn_held(contact.push);
+    turn_held(contact.drag);
     const Vec3 previous = contact.pose.apply_inverse(state.previous_probe);
-    if (auto* shading = std::get_if<ShadingMemory>(&contact.law.memory))
-      shading->turned = turn(shading->turned) / scale;
-    if (auto* potential = std::get_if<PotentialMemory>(&contact.law.memory)) potential->stiffness /= scale * scale;
     if (auto* crossing = std::get_if<CrossingMemory>(&contact.law.memory)) crossing->previous = previous;
     if (auto* point = std::get_if<ContactPointMemory>(&contact.law.memory)) point->previous = previous;
   }
@@ -110,7 +109,6 @@ bool sample(Tick& tick) noexcept {
     state.view = view;
   }
   tick.changed = state.epoch != tick.scene.epoch();
-  tick.held = state.proxy;
   if (tick.changed) {
     if (!tick.first) adopt_view(view, tick);
     for (std::size_t i = state.contacts.size(); i-- > 0;) {
@@ -124,6 +122,10 @@ bool sample(Tick& tick) noexcept {
     }
   }
   state.epoch = tick.scene.epoch();
+  tick.moved = tick.probe->pose.position - state.previous_probe;
+  const double lent = tick.scene.lends();
+  state.account.open(tick.moved, tick.scene.settings().energy_capacity + lent, tick.first);
+  if (tick.first) state.account.fill(lent);
   return true;
 }
 

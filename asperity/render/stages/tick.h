@@ -21,6 +21,9 @@ struct Tick {
        ForceSample& answered) noexcept
       : scene(in), state(of), cache(with), workspace(told), dt(since), out(answered) {}
 
+  /// How far the probe is told to go until the next tick (m, in the scene).
+  [[nodiscard]] Vec3 ahead() const noexcept { return dt.count() * probe->twist.linear; }
+
   const Scene& scene;
   ProxyState& state;
   ProxyCache& cache;
@@ -33,7 +36,7 @@ struct Tick {
   bool direct = true;                     ///< the scene is the workspace
   bool first = false;                     ///< of the state
   bool changed = false;                   ///< another scene than at the last tick
-  Vec3 held = Vec3::Zero();  ///< where the proxy was, before a change of the scene moved it: what its spring held
+  Vec3 moved = Vec3::Zero();              ///< m, in the scene: the probe since the last tick
 
   // reach
   FixedVector<Touched, most_contacts> touches;
@@ -46,7 +49,6 @@ struct Tick {
   // constrain
   FixedVector<Part, most_contacts> parts;
   Vec3 felt = Vec3::Zero();  ///< the proxy to be shown: without skins
-  double proxy_share = 1.0;  ///< of the proxy's spring that is rendered, where its energy was limited
   bool converged = true;
   bool limited = false;  ///< less was rendered than there would have been, for want of energy
 
