@@ -72,6 +72,7 @@ struct OfSurface {
 /// What one probe remembers of one instance between ticks.
 struct Contact {
   std::uint32_t instance = no_index;
+  float stiffness = 0.0F;     ///< N/m, of the material that it pushed with at the last tick; 0: it did not
   bool touching = false;      ///< pushed, or held the proxy, at the last tick
   bool placed = false;        ///< `pose` is of the last tick
   bool moved = false;         ///< the instance has changed under the probe since the tick before the last
@@ -114,6 +115,7 @@ struct ProxyState {
   Seconds previous_time{0.0};
   EnergyAccount account;
   HeldForce spring;                     ///< between probe and proxy, with its textures
+  float stiffness = 0.0F;               ///< N/m, of the material behind it at the last tick; 0: free
   Vec3 force = Vec3::Zero();            ///< N, scene: answered at the last tick
   Vec3 residual = Vec3::Zero();         ///< N, scene: what is left of the force before the last change of the scene
   Vec3 workspace_probe = Vec3::Zero();  ///< m: the probe at the last tick, before the view

@@ -46,10 +46,11 @@ struct Names<Giver> {
 /// |force|^2 / (2 stiffness).
 struct HeldForce {
   Vec3 force = Vec3::Zero();  ///< N, world
-  double stiffness = 0.0;     ///< N/m; 0: free until now
+  float stiffness = 0.0F;     ///< N/m; 0: free until now
+  bool softened = false;      ///< less was rendered than there would have been
   /// J. [servo]
   [[nodiscard]] double energy() const noexcept {
-    return stiffness > 0.0 ? force.squaredNorm() / (2.0 * stiffness) : 0.0;
+    return stiffness > 0.0F ? force.squaredNorm() / (2.0 * static_cast<double>(stiffness)) : 0.0;
   }
 };
 
@@ -108,12 +109,14 @@ class EnergyAccount {
   double hold(Giver giver, HeldForce& held, const Vec3& force, double stiffness) noexcept {
     // Of sums of products: a spring that is held at rest is not to be softened by its last digit.
     constexpr double rounding = 1e-9;
+    // As it is remembered.
+    stiffness = static_cast<double>(static_cast<float>(stiffness));
     const double now = force.squaredNorm() / (2.0 * stiffness);
     // What the hand has really put in, and what the force, held still over the tick, gave too much or took too little
     // of it: by as much as it has changed over the hand's motion, unless something else has changed it.
     const double put_in = held.energy() - held.force.dot(moved_);
-    double slope = held.stiffness > 0.0 ? held.stiffness : stiffness;
-    if (giver == Giver::spring) {
+    double slope = held.stiffness > 0.0F ? static_cast<double>(held.stiffness) : stiffness;
+    if (giver == Giver::spring && !held.softened) {
       constexpr double third_order = 0.1;
       const double way = moved_.norm();
       const double seen = way > 0.0 ? (force - held.force).norm() / way : 0.0;
@@ -130,14 +133,14 @@ class EnergyAccount {
       // Never none of it: a spring that is still held is not a free one.
       if (paid < now - before) share = std::max((before + paid) / now, 1e-12);
     }
-    held = {share * force, share * stiffness};
+    held = {share * force, static_cast<float>(share * stiffness), share < 1.0};
     return share;
   }
   /// What was held is let go: what the hand has put into it may come back later. [servo]
   void release(HeldForce& held) noexcept {
-    if (!(held.stiffness > 0.0)) return;
+    if (!(held.stiffness > 0.0F)) return;
     fill(held.energy() - held.force.dot(moved_));
-    stiffness_ += held.stiffness;
+    stiffness_ += static_cast<double>(held.stiffness);
     held = {};
   }
   /// The share that may be rendered of a force that nothing holds, over the tick that comes: against the hand all of

@@ -381,7 +381,10 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   answer.point = point - rule.offset * normal;
   // Of a force that is an energy's slope, the depth that the energy goes by.
   answer.penetration = !drags && spring.trust == 1.0 ? -here.value : pull.norm();
-  answer.force = answer.spring = material.stiffness * pull;
+  answer.force = material.stiffness * pull;
+  answer.local = material.stiffness;
+  answer.unheld = spring.trust < 1.0;
+  if (!answer.unheld) answer.spring = answer.force;
   // Of the energy k g^2 / 2 that the force is the slope of.
   constexpr double least_slope = 1e-3;
   const bool slope = !drags && spring.trust == 1.0 && !outside;

@@ -119,12 +119,12 @@ void to_world(const Touched& touch, LawForce& law) noexcept {
 }
 
 /// What makes a contact hold more than was put into it.
-Giver cause_of(const Tick& tick, const Touched& touch, const HeldForce& held, double stiffness) noexcept {
+Giver cause_of(const Tick& tick, const Touched& touch, float before, float now) noexcept {
   if (tick.changed) return Giver::change;
   if (touch.moved) return Giver::motion;
   if (tick.surfaces_moved && touch.facts->volume) return Giver::level;
   if (std::holds_alternative<std::shared_ptr<const CustomLaw>>(touch.instance->law)) return Giver::custom;
-  return held.stiffness > 0.0 && stiffness > held.stiffness ? Giver::stiffness : Giver::spring;
+  return before > 0.0F && now != before ? Giver::stiffness : Giver::spring;
 }
 
 double stiffness_of(const LawForce& law, const Material& material) noexcept {
@@ -179,8 +179,9 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
   }
   if (printed) loose -= law.friction;
   if (instance.fine != nullptr && instance.fine->settings().formulation == Formulation::literal) loose -= law.texture;
-  if (touch.moved) {
-    const double share = account.spend(Giver::motion, loose, ahead);
+  if (touch.moved || law.unheld) {
+    const double share = account.spend(touch.moved ? Giver::motion : Giver::spring, loose, ahead);
+    tell(tick, share);
     law.force -= (1.0 - share) * loose;
     law.friction *= share;
   } else {
@@ -202,9 +203,12 @@ void settle_law(Tick& tick, const Touched& touch, const Material& material, LawF
   HeldForce& held = touch.contact->push;
   const double stiffness = stiffness_of(law, material);
   if (law.contact && !law.spring.isZero(0.0)) {
-    const Giver cause = cause_of(tick, touch, held, stiffness);
+    const auto local = static_cast<float>(law.local > 0.0 ? law.local : material.stiffness);
+    const Giver cause = cause_of(tick, touch, touch.contact->stiffness, local);
+    touch.contact->stiffness = local;
     soften(tick, account.hold(cause, held, law.spring, stiffness), law);
   } else {
+    touch.contact->stiffness = 0.0F;
     account.release(held);
   }
   settle_loose(tick, touch, law);
@@ -226,10 +230,13 @@ void settle_parts(Tick& tick) noexcept {
   }
   double share = 1.0;
   if (strongest != nullptr) {
-    Giver cause = cause_of(tick, *strongest->touch, held, stiffness);
+    const auto local = static_cast<float>(strongest->stiffness);
+    Giver cause = cause_of(tick, *strongest->touch, tick.state.stiffness, local);
     for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
+    tick.state.stiffness = local;
     share = account.hold(cause, held, spring, stiffness);
   } else {
+    tick.state.stiffness = 0.0F;
     account.release(held);
   }
   for (Part& part : tick.parts) {

@@ -255,7 +255,7 @@ void carry(Tick& tick) noexcept {
   bool overtaken = false;
   tick.surfaces_moved = follow_surfaces(tick, overtaken);
   // Where the new scene's surfaces have come over a resting proxy it starts from their outside.
-  if (tick.changed && (overtaken || state.spring.stiffness > 0.0)) {
+  if (tick.changed && (overtaken || state.spring.stiffness > 0.0F)) {
     for (const Touched& touch : tick.touches) {
       if (touch.facts->sides == Sides::front && touch.facts->constrains && !touch.contact->surface.rests)
         state.proxy = pushed_to_front(tick, touch, true, state.proxy);

@@ -28,7 +28,7 @@ void adopt_view(const View& view, Tick& tick) noexcept {
   const double scale = last.zoom / view.zoom;
   const auto turn_held = [&](HeldForce& held) {
     held.force = turn(held.force) / scale;
-    held.stiffness /= scale * scale;
+    held.stiffness /= static_cast<float>(scale * scale);
   };
   turn_held(state.spring);
   state.account.turn([&](const Vec3& force) { return Vec3(turn(force) / scale); });
