@@ -43,6 +43,9 @@ LawForce CustomLaw::force(const Instance& instance, const FeltView& view, const 
   force.element = answer.element;
   force.damped = answer.damped;
   force.spring = answer.force - (answer.damping.allFinite() ? answer.damping : Vec3(Vec3::Zero()));
+  if (answer.stored && std::isfinite(*answer.stored)) force.stored = answer.stored;
+  force.keeps = !force.stored;
+  if (std::isfinite(answer.stiffness)) force.stiffness = std::max(0.0, answer.stiffness);
   if (answer.damped) force.push = std::max(0.0, answer.force.dot(answer.normal));
   return force;
 }

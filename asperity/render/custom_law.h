@@ -3,6 +3,7 @@
 
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,9 +27,12 @@ struct CustomForce {
   std::uint32_t element = no_index;  ///< face, cell or patch
   /// The force has its damping already; otherwise the material's is added along the normal, and never pulls.
   bool damped = false;
-  /// Of a force that has it: the part that resists the motion (N), which the hand never gets back. What is not told is
-  /// taken for a spring's, and softened where the hand has not put it in.
+  /// Of a force that has it: the part that resists the motion (N), which the hand never gets back.
   Vec3 damping = Vec3::Zero();
+  /// The energy whose slope the rest is (J, 0 where it ends). Where it is not told, the force gives back what the hand
+  /// has put into it, and no more: it is softened.
+  std::optional<double> stored = std::nullopt;
+  double stiffness = 0.0;  ///< N/m, the most by which the force changes with a motion; 0: the material's
 };
 
 /// The surface that a law touches, object frame, whatever kind it is. [servo]

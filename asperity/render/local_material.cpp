@@ -130,6 +130,8 @@ Attraction attraction_at(const Touched& touch, const Vec3& p) noexcept {
   const double share = std::max(0.0, phi.value) / band;
   const double inner = 1.0 - share * share;
   const double depth = band * band / 6.0 * inner * inner * inner;
+  pull.felt = true;
+  pull.stiffness = strength;
   pull.potential = -strength * depth;
   pull.force = depth * slope - strength * band * share * inner * inner * phi.gradient;
   return pull;

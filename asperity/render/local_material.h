@@ -44,6 +44,8 @@ Vec3 mapped_lay(const ReliefSurface& relief, const CoatPlace& place, double& str
 struct Attraction {
   Vec3 force = Vec3::Zero();  ///< N, object frame
   double potential = 0.0;     ///< J, 0 out of reach and negative nearer
+  double stiffness = 0.0;     ///< N/m, the most by which it changes with a motion
+  bool felt = false;          ///< in reach
 };
 /// Of a coated mesh at p (object frame): the slope of -m e^2 / 6 (1 - (Phi / e)^2)^3 with m the magnetism there, e its
 /// band and Phi the relief's height below p; constant in Phi inside. A loop in it does no work. [servo]

@@ -327,9 +327,8 @@ Status check_motion(const Instance& instance, std::size_t index) {
   return success();
 }
 
-/// What a magnet gives to a hand that it draws in (J), with room for what a tick cannot resolve.
+/// What a magnet gives to a hand that it draws in (J).
 double well_of(const Instance& instance) noexcept {
-  constexpr double room = 1.02;
   double stiffness = 0.0;
   double band = 0.0;
   if (const auto* law = std::get_if<MagneticLaw>(&instance.law); law != nullptr) {
@@ -341,7 +340,7 @@ double well_of(const Instance& instance) noexcept {
     stiffness = map ? maps->most(MaterialChannel::magnetism) : instance.material.magnetism;
     band = instance.material.magnetic_band;
   }
-  return room * stiffness * band * band / 6.0;
+  return stiffness * band * band / 6.0;
 }
 
 }  // namespace

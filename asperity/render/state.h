@@ -84,6 +84,7 @@ struct Contact {
   std::optional<double> detail_level;  ///< of the coat, felt at the last tick
   HeldForce push;                      ///< of a law without a proxy, with its texture
   HeldForce drag;                      ///< of a friction law's spring
+  HeldForce draw;                      ///< of what draws the probe from outside
   OfSurface surface;
   OfLaw law;
 
@@ -100,7 +101,7 @@ struct Contact {
     return law.memory.emplace<Memory>();
   }
 };
-static_assert(sizeof(Contact) < 480);
+static_assert(sizeof(Contact) <= 520);
 
 /// Instances that one probe feels at once.
 inline constexpr std::size_t most_contacts = 8;
@@ -125,7 +126,7 @@ struct ProxyState {
   /// replay does after having it fetched.
   int wanted_level = -1;
 };
-static_assert(sizeof(ProxyState) < 4500);
+static_assert(sizeof(ProxyState) <= 4800);
 
 /// What a tick may remember of surfaces to be quick. Nothing in it changes an answer: it may be shared between probes
 /// of one thread, dropped or replaced at any tick.

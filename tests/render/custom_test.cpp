@@ -298,6 +298,7 @@ TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
   // It gives as it likes: the scene pays.
   SceneSettings settings;
   settings.change_power = settings.energy_capacity = 1e3;
+  settings.handover = Seconds(0.0);
   const Scene scene = must(Scene::build({instance}, settings));
   ProxyState first;
   ProxyState second;
@@ -326,8 +327,9 @@ TEST(CustomLaw, MaterialsDampingAndFrictionComeOnTop) {
     const Scene scene = must(Scene::build({instance}, 0.0));
     ProxyState state;
     ForceSample out;
-    for (int i = 0; i <= 100; ++i) {
-      ProbeSample probe = probe_at(Vec3(1e-5 * i, 0.0, 0.028));
+    // From outside: the hand gets back what it has put in.
+    for (int i = -200; i <= 100; ++i) {
+      ProbeSample probe = probe_at(Vec3(1e-5 * std::max(i, 0), 0.0, 0.028 - 1.1e-5 * std::min(i, 0)));
       probe.twist.linear = Vec3(0.01, 0.0, -0.02);
       out = step(scene, state, probe, tick);
     }

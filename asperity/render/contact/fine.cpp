@@ -164,6 +164,7 @@ bool add_relief_texture(const TextureSample& texture, double highest, double sti
   const Vec3 relief = push * (law.normal - slope);
   law.spring += relief - law.push * law.normal;
   law.stiffness = stiffness * (1.0 + slope.squaredNorm());
+  law.stored = 0.5 * stiffness * penetration * penetration;
   law.texture = relief - law.push * law.normal;
   law.force += law.texture;
   // Damping was measured against the constraint's whole push.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "asperity/core/math.h"
 #include "asperity/core/names.h"
@@ -42,16 +43,21 @@ struct Names<Giver> {
                                                              {Giver::handover, "handover"}});
 };
 
-/// A force as it was rendered, and by how much it changes with a motion: frozen, it is a spring that holds
-/// |force|^2 / (2 stiffness).
+/// A force as it was rendered, and by how much it changes with a motion: frozen, it is a spring.
 struct HeldForce {
   Vec3 force = Vec3::Zero();  ///< N, world
+  double energy = 0.0;        ///< J, that it may give back
   float stiffness = 0.0F;     ///< N/m; 0: free until now
-  bool softened = false;      ///< less was rendered than there would have been
-  /// J. [servo]
-  [[nodiscard]] double energy() const noexcept {
-    return stiffness > 0.0F ? force.squaredNorm() / (2.0 * static_cast<double>(stiffness)) : 0.0;
-  }
+  bool softened = false;      ///< something else was rendered than there would have been
+};
+
+/// The part of a law's force that is held now.
+struct Spring {
+  Vec3 force = Vec3::Zero();  ///< N, world
+  double stiffness = 0.0;     ///< N/m, above 0: the most by which it changes with a motion
+  /// J, the energy whose slope it is, 0 where it ends: below 0 in a well. Not told: that of a spring that draws so hard.
+  std::optional<double> stored = std::nullopt;
+  bool keeps = false;         ///< no energy's slope: it holds whatever is put into it
 };
 
 /// Energy that the hand has put in beyond what the forces hold, and that they may give back. At no tick has the hand
@@ -104,43 +110,61 @@ class EnergyAccount {
     return paid;
   }
 
-  /// The share that may be rendered of a force (N, world) that is held: as much as the frozen force holds after the
-  /// hand's motion, and as the account pays. Remembers what is rendered. `stiffness`: above 0. [servo]
-  double hold(Giver giver, HeldForce& held, const Vec3& force, double stiffness) noexcept {
+  /// The share that may be rendered of a force that is held: as much as the frozen force holds after the hand's motion,
+  /// and as the account pays. Remembers what is rendered. [servo]
+  double hold(Giver giver, HeldForce& held, const Spring& spring) noexcept {
     // Of sums of products: a spring that is held at rest is not to be softened by its last digit.
     constexpr double rounding = 1e-9;
     // As it is remembered.
-    stiffness = static_cast<double>(static_cast<float>(stiffness));
-    const double now = force.squaredNorm() / (2.0 * stiffness);
+    const auto stiffness = static_cast<double>(static_cast<float>(spring.stiffness));
+    const double least = spring.force.squaredNorm() / (2.0 * stiffness);
     // What the hand has really put in, and what the force, held still over the tick, gave too much or took too little
     // of it: by as much as it has changed over the hand's motion, unless something else has changed it.
-    const double put_in = held.energy() - held.force.dot(moved_);
+    const double put_in = held.energy - held.force.dot(moved_);
     double slope = held.stiffness > 0.0F ? static_cast<double>(held.stiffness) : stiffness;
+    const double way = moved_.squaredNorm();
+    double hold = 0.5 * slope * way;
     if (giver == Giver::spring && !held.softened) {
       constexpr double third_order = 0.1;
-      const double way = moved_.norm();
-      const double seen = way > 0.0 ? (force - held.force).norm() / way : 0.0;
+      const double seen = way > 0.0 ? std::sqrt((spring.force - held.force).squaredNorm() / way) : 0.0;
       // Twice: all of the change may be at the beginning, where two slopes meet.
       slope = std::max(slope, 2.0 * seen) + third_order * slope;
+      hold = 0.5 * slope * way;
+    } else if (giver == Giver::stiffness || held.softened) {
+      // Of what goes on as stiff as it was: the rest is the place's, not the motion's.
+      const double before = static_cast<double>(held.stiffness) / stiffness;
+      hold = std::min(hold, 0.5 * (held.force - before * spring.force).dot(moved_));
     }
-    const double before = put_in + 0.5 * slope * moved_.squaredNorm();
+    const double before = put_in + hold;
     stiffness_ += slope;
+    double now = spring.stored.value_or(least);
+    if (spring.keeps) now = std::max(now, put_in);
+    // Less would do: by so much the frozen force can give at most.
+    const double needed = std::min(now, least);
     double share = 1.0;
     if (now <= before) {
       fill(put_in - now);
-    } else if (!first_ && now > before * (1.0 + rounding)) {
-      const double paid = pay(giver, now - before);
-      // Never none of it: a spring that is still held is not a free one.
-      if (paid < now - before) share = std::max((before + paid) / now, 1e-12);
+    } else if (!first_) {
+      const double wanted = needed - before;
+      const double paid = wanted > rounding * std::abs(needed) ? pay(giver, wanted) : 0.0;
+      now = before + paid;
+      if (now - needed < -rounding * std::abs(needed)) {
+        share = share_of(now, needed, static_cast<double>(held.stiffness) / stiffness);
+        now = share * needed;
+      }
     }
-    held = {share * force, static_cast<float>(share * stiffness), share < 1.0};
+    held = {share * spring.force, now, static_cast<float>(share * stiffness), share != 1.0};
     return share;
   }
   /// What was held is let go: what the hand has put into it may come back later. [servo]
   void release(HeldForce& held) noexcept {
     if (!(held.stiffness > 0.0F)) return;
-    fill(held.energy() - held.force.dot(moved_));
-    stiffness_ += static_cast<double>(held.stiffness);
+    const auto slope = static_cast<double>(held.stiffness);
+    const double put_in = held.energy - held.force.dot(moved_);
+    fill(put_in);
+    // Out of a well: what is missing to its edge.
+    level_ += std::min(0.0, put_in + 0.5 * slope * moved_.squaredNorm());
+    stiffness_ += slope;
     held = {};
   }
   /// The share that may be rendered of a force that nothing holds, over the tick that comes: against the hand all of
@@ -149,7 +173,7 @@ class EnergyAccount {
   double spend(Giver giver, const Vec3& force, const Vec3& ahead) noexcept {
     constexpr double changeover = 0.1;  // cosine between force and motion over which taking turns into giving
     constexpr double plenty = 1e-6;     // J: below that it fades
-    const Vec3& way = force.dot(moved_) > force.dot(ahead) ? moved_ : ahead;
+    const Vec3& way = ahead.isZero(0.0) ? moved_ : ahead;
     const double given = force.dot(way);
     const double most = force.norm() * way.norm();
     double share = 1.0;
@@ -187,6 +211,18 @@ class EnergyAccount {
   void take(const Vec3& force) noexcept { loose_ += force; }
 
  private:
+  /// The share of a force with the energy `now` that has `allowed`, which is less. In a well that is more than all of
+  /// it: no shallower than it was, and no steeper either (`most`).
+  double share_of(double allowed, double now, double most) noexcept {
+    // Never none of it: a spring that is still held is not a free one.
+    constexpr double least = 1e-12;
+    const double share = now > 0.0   ? std::max(allowed / now, least)
+                         : now < 0.0 ? std::clamp(allowed / now, 1.0, std::max(1.0, most))
+                                     : 1.0;
+    level_ -= std::max(0.0, share * now - allowed - least * now);
+    return share;
+  }
+
   double level_ = 0.0;
   double capacity_ = default_capacity;
   bool first_ = false;

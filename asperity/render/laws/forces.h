@@ -18,8 +18,9 @@ struct LawForce {
   std::uint32_t element = no_index;
   Vec3 spring = Vec3::Zero();    ///< N, the part of the force that is held: neither damping nor friction
   double stiffness = 0.0;        ///< N/m: by how much that changes; 0: the material's
+  std::optional<double> stored;  ///< J, the energy that `spring` is the slope of; not told: as its size tells
+  bool keeps = false;            ///< `spring` is no energy's slope, and holds whatever is put into it
   double local = 0.0;            ///< N/m: the material's where it is touched, if the law looks that up; 0: it does not
-  bool unheld = false;           ///< the force is no energy's slope: what it gives is paid as it is given
   bool damped = false;           ///< damping is part of the force already, and `spring` is told
   double push = 0.0;             ///< N along the normal, before damping: what friction and texture go by
   Vec3 friction = Vec3::Zero();  ///< N, the part of the force that is friction

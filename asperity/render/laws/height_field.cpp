@@ -125,6 +125,7 @@ LawForce potential_contact(double value, const Vec3& gradient, double height, st
   answer.contact = true;
   answer.force = answer.spring = -stiffness * value * gradient;
   answer.stiffness = stiffness * steepness * steepness;
+  answer.stored = 0.5 * stiffness * value * value;
   answer.normal = gradient / steepness;
   answer.penetration = -value;
   answer.point = probe - value / steepness * answer.normal;

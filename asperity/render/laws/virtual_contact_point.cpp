@@ -221,12 +221,18 @@ struct Trust {
   [[nodiscard]] double at(double g) const noexcept { return std::clamp((g + depth) / fade + 1.0, 0.0, 1.0); }
 };
 
-/// What the potential says at the probe. Force = stiffness pull, the slope of an energy where `trust` is 1.
-struct Spring {
+/// What the potential says at the probe. Force = stiffness pull, and pull = -grad energy where `trust` is 1.
+struct Pull {
   Vec3 pull = Vec3::Zero();  ///< m
+  double energy = 0.0;       ///< m²; 0 far outside
   double trust = 1.0;
   Vec3 foot = Vec3::Zero();  ///< of the surface that is felt
 };
+
+/// Depth of the well that a magnet's band is, from its edge to the surface (m², by stiffness).
+double well(double band) noexcept {
+  return band * band / 6.0;
+}
 
 /// Normal of the surface where the probe came in, if it has jumped over the band within one tick.
 Vec3 arrival_normal(const Felt& felt, const Vec3& probe, Held& state) noexcept {
@@ -236,10 +242,10 @@ Vec3 arrival_normal(const Felt& felt, const Vec3& probe, Held& state) noexcept {
 }
 
 /// Keeps state.normal: the gradient's direction, held where that cannot be trusted. `g`: less than the band.
-Spring spring_at(const Felt& felt, const Trust& trust, double band, const Potential& here, const Vec3& probe,
+Pull spring_at(const Felt& felt, const Trust& trust, double band, const Potential& here, const Vec3& probe,
                  Held& state) noexcept {
   const double g = here.value;
-  Spring spring;
+  Pull spring;
   spring.foot = probe - g * here.gradient;
   spring.trust = trust.at(g);
   if (spring.trust == 1.0) {
@@ -253,9 +259,12 @@ Spring spring_at(const Felt& felt, const Trust& trust, double band, const Potent
     const double share = g / band;
     const double window = 1.0 - share * share;
     spring.pull = -g * window * window * here.gradient;
+    spring.energy = -well(band) * window * window * window;
     return spring;
   }
   spring.pull = -g * here.gradient;
+  const double depth = std::min(-g, trust.depth);
+  spring.energy = 0.5 * depth * depth - well(band);
   if (spring.trust < 1.0) {
     spring.pull = spring.trust * spring.pull + (1.0 - spring.trust) * trust.depth * state.normal;
     spring.foot = probe + spring.pull;
@@ -312,7 +321,7 @@ double surface_along(const Felt& felt, const Vec3& probe, const Vec3& way, doubl
 }
 
 /// The contact point that friction holds back: by the millisecond what eq. 2 does by the tick (amendment 15).
-Vec3 dragged(const Felt& felt, double voxel, double friction, Seconds dt, const Spring& spring, double start,
+Vec3 dragged(const Felt& felt, double voxel, double friction, Seconds dt, const Pull& spring, double start,
              const Vec3& probe, Held& state) noexcept {
   constexpr double printed_tick = 1e-3;  // s: the paper's loop runs at 1 kHz
   const double ticks = std::max(0.0, dt.count()) / printed_tick;
@@ -353,7 +362,7 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
     return {};
   }
   const Trust trust(surface, felt.level());
-  const Spring spring = spring_at(felt, trust, rule.band, here, probe, state);
+  const Pull spring = spring_at(felt, trust, rule.band, here, probe, state);
   const Vec3 normal = state.normal;
   const Material material = material_at(surface, own, spring.foot - rule.offset * normal, state.cache.sparse);
   const bool drags = material.dynamic_friction > 0.0 && !material.friction_named && !outside;
@@ -383,12 +392,10 @@ LawForce consistent_force(const Rule& rule, const ImplicitSurface& surface, cons
   answer.penetration = !drags && spring.trust == 1.0 ? -here.value : pull.norm();
   answer.force = material.stiffness * pull;
   answer.local = material.stiffness;
-  answer.unheld = spring.trust < 1.0;
-  if (!answer.unheld) answer.spring = answer.force;
-  // Of the energy k g^2 / 2 that the force is the slope of.
-  constexpr double least_slope = 1e-3;
-  const bool slope = !drags && spring.trust == 1.0 && !outside;
-  answer.stiffness = material.stiffness * (slope ? std::max(here.gradient.squaredNorm(), least_slope) : 1.0);
+  answer.spring = answer.force;
+  answer.stored = material.stiffness * ((drags ? 0.5 * pull.squaredNorm() - well(rule.band) : spring.energy));
+  answer.keeps = spring.trust < 1.0;
+  if (!drags && !answer.keeps) answer.stiffness = material.stiffness * std::max(1.0, here.gradient.squaredNorm());
   answer.push = outside ? 0.0 : answer.force.dot(normal);
   if (rule.band > 0.0) {
     answer.force += magnet_damping(here.value, rule.band, material.damping, normal, velocity);

@@ -131,15 +131,15 @@ double stiffness_of(const LawForce& law, const Material& material) noexcept {
   return law.stiffness > 0.0 ? law.stiffness : material.stiffness;
 }
 
-/// Tells that less is rendered than there would be; what is rounding is not told.
+/// Tells that something else is rendered than there would be; what is rounding is not told.
 void tell(Tick& tick, double share) noexcept {
   constexpr double rounding = 1e-6;
-  tick.limited = tick.limited || share < 1.0 - rounding;
+  tick.limited = tick.limited || std::abs(share - 1.0) > rounding;
 }
 
 /// Renders a share of what a contact pushes with, and of the friction and texture that go by it.
 void soften(Tick& tick, double share, LawForce& law) noexcept {
-  if (share >= 1.0) return;
+  if (share == 1.0) return;
   tell(tick, share);
   law.force *= share;
   law.spring *= share;
@@ -163,7 +163,7 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
     const Vec3 spring = -friction.stiffness * touch.turned(friction.stretch);
     loose -= spring;
     const double share =
-        account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, spring, friction.stiffness);
+        account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, {spring, friction.stiffness});
     if (share < 1.0) {
       tell(tick, share);
       law.force -= (1.0 - share) * spring;
@@ -179,8 +179,8 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
   }
   if (printed) loose -= law.friction;
   if (instance.fine != nullptr && instance.fine->settings().formulation == Formulation::literal) loose -= law.texture;
-  if (touch.moved || law.unheld) {
-    const double share = account.spend(touch.moved ? Giver::motion : Giver::spring, loose, ahead);
+  if (touch.moved) {
+    const double share = account.spend(Giver::motion, loose, ahead);
     tell(tick, share);
     law.force -= (1.0 - share) * loose;
     law.friction *= share;
@@ -202,11 +202,11 @@ void settle_law(Tick& tick, const Touched& touch, const Material& material, LawF
   EnergyAccount& account = tick.state.account;
   HeldForce& held = touch.contact->push;
   const double stiffness = stiffness_of(law, material);
-  if (law.contact && !law.spring.isZero(0.0)) {
+  if (law.contact && (law.stored || !law.spring.isZero(0.0))) {
     const auto local = static_cast<float>(law.local > 0.0 ? law.local : material.stiffness);
     const Giver cause = cause_of(tick, touch, touch.contact->stiffness, local);
     touch.contact->stiffness = local;
-    soften(tick, account.hold(cause, held, law.spring, stiffness), law);
+    soften(tick, account.hold(cause, held, {law.spring, stiffness, law.stored, law.keeps}), law);
   } else {
     touch.contact->stiffness = 0.0F;
     account.release(held);
@@ -234,7 +234,7 @@ void settle_parts(Tick& tick) noexcept {
     Giver cause = cause_of(tick, *strongest->touch, tick.state.stiffness, local);
     for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
     tick.state.stiffness = local;
-    share = account.hold(cause, held, spring, stiffness);
+    share = account.hold(cause, held, {spring, stiffness, tick.parts.size() == 1 ? tick.parts[0].law.stored : std::nullopt});
   } else {
     tick.state.stiffness = 0.0F;
     account.release(held);
@@ -325,10 +325,12 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
 /// What draws the probe to an instance, where something does.
 void add_attraction(Tick& tick, Touched& touch) noexcept {
   const Attraction pull = attraction_at(touch, touch.to_local(tick.probe->pose.position));
-  if (pull.force.isZero(0.0)) return;
+  HeldForce& held = touch.contact->draw;
+  if (!pull.felt) return tick.state.account.release(held);
   const Vec3 force = touch.turned(pull.force);
-  tick.out.wrench.force += tick.state.account.spend(Giver::attraction, force, tick.ahead()) * force;
-  tick.out.flags.set(TickFlag::field_force);
+  const Spring spring{force, pull.stiffness, pull.potential};
+  tick.out.wrench.force += tick.state.account.hold(Giver::attraction, held, spring) * force;
+  if (!force.isZero(0.0)) tick.out.flags.set(TickFlag::field_force);
 }
 
 /// What is felt of volumes without a surface.

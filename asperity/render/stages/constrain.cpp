@@ -92,6 +92,8 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   if (!rest.pulls) {
     // A law as printed has turned the force away from what the spring holds.
     const bool turned = law.force != law.spring;
+    // What the cone cuts off is no gift: the proxy is where it is.
+    law.stored = 0.5 * material.stiffness * spring.squaredNorm();
     const Vec3 force = on_cone(law.force, law.normal, friction, surface.sliding);
     law.spring = turned ? on_cone(law.spring, law.normal, friction, surface.sliding) : force;
     law.force = with_damping(force, law.normal, tick.probe->twist.linear, material.damping);

@@ -125,7 +125,7 @@ bool keep_contacts(const Scene& scene, ProxyState& state, const Vec3& probe, con
   };
   scene.for_each_in_box(around, visit, [&](const Box& box) { return reached.matters(box); });
   for (std::size_t i = state.contacts.size(); i-- > 0;) {
-    if (!reached.holds(state.contacts[i].instance)) state.contacts.swap_remove(i);
+    if (!reached.holds(state.contacts[i].instance)) let_go(state, i);
   }
   reached.for_each([&](std::uint32_t instance) {
     if (contact_of(state, instance) == nullptr) state.contacts.emplace_back()->instance = instance;

@@ -41,6 +41,7 @@ void adopt_view(const View& view, Tick& tick) noexcept {
     contact.law.friction.stiffness /= scale * scale;
     turn_held(contact.push);
     turn_held(contact.drag);
+    turn_held(contact.draw);
     const Vec3 previous = contact.pose.apply_inverse(state.previous_probe);
     if (auto* crossing = std::get_if<CrossingMemory>(&contact.law.memory)) crossing->previous = previous;
     if (auto* point = std::get_if<ContactPointMemory>(&contact.law.memory)) point->previous = previous;
@@ -109,23 +110,21 @@ bool sample(Tick& tick) noexcept {
     state.view = view;
   }
   tick.changed = state.epoch != tick.scene.epoch();
+  if (tick.changed && !tick.first) adopt_view(view, tick);
+  tick.moved = tick.probe->pose.position - state.previous_probe;
+  state.account.open(tick.moved, tick.scene.settings().energy_capacity, tick.first);
   if (tick.changed) {
-    if (!tick.first) adopt_view(view, tick);
     for (std::size_t i = state.contacts.size(); i-- > 0;) {
       Contact& contact = state.contacts[i];
       const auto felt = tick.scene.felt();
       if (contact.instance >= felt.size() || !adopt(contact, felt[contact.instance])) {
-        state.contacts.swap_remove(i);
+        let_go(state, i);
       } else if (!tick.scene.facts(contact.instance).changes) {
         contact.outside.reset();
       }
     }
   }
   state.epoch = tick.scene.epoch();
-  tick.moved = tick.probe->pose.position - state.previous_probe;
-  const double lent = tick.scene.lends();
-  state.account.open(tick.moved, tick.scene.settings().energy_capacity + lent, tick.first);
-  if (tick.first) state.account.fill(lent);
   return true;
 }
 

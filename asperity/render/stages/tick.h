@@ -57,6 +57,12 @@ struct Tick {
   double strongest = -1.0;  ///< N, of the contacts so far
 };
 
+/// Forgets one of a probe's contacts, and keeps what the hand has put into it. [servo]
+inline void let_go(ProxyState& state, std::size_t contact) noexcept {
+  Contact& gone = state.contacts[contact];
+  for (HeldForce* held : {&gone.push, &gone.drag, &gone.draw}) state.account.release(*held);
+  state.contacts.swap_remove(contact);
+}
 /// Whether a sample is a place at all. [servo]
 inline bool is_place(const ProbeSample& probe) noexcept {
   // No device is a thousand kilometres away: such a number is as broken as a NaN, and would leave the searches' range.
