@@ -153,7 +153,9 @@ class EnergyAccount {
         now = share * needed;
       }
     }
-    held = {share * spring.force, now, static_cast<float>(share * stiffness), share != 1.0};
+    // Never free while it is held.
+    constexpr double faintest = 1e-12;
+    held = {share * spring.force, now, static_cast<float>(std::max(share, faintest) * stiffness), share != 1.0};
     return share;
   }
   /// What was held is let go: what the hand has put into it may come back later. [servo]
@@ -214,12 +216,10 @@ class EnergyAccount {
   /// The share of a force with the energy `now` that has `allowed`, which is less. In a well that is more than all of
   /// it: no shallower than it was, and no steeper either (`most`).
   double share_of(double allowed, double now, double most) noexcept {
-    // Never none of it: a spring that is still held is not a free one.
-    constexpr double least = 1e-12;
-    const double share = now > 0.0   ? std::max(allowed / now, least)
+    const double share = now > 0.0   ? std::max(0.0, allowed / now)
                          : now < 0.0 ? std::clamp(allowed / now, 1.0, std::max(1.0, most))
                                      : 1.0;
-    level_ -= std::max(0.0, share * now - allowed - least * now);
+    level_ -= std::max(0.0, share * now - allowed);
     return share;
   }
 
