@@ -16,8 +16,8 @@ using implicit::forces_along;
 using implicit::largest_jump_on;
 using implicit::loop_work;
 using implicit::PointTouch;
-using implicit::WholeTouch;
 using implicit::surface_of;
+using implicit::WholeTouch;
 using test::stiffness;
 
 constexpr double voxel = 1e-3;

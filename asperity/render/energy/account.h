@@ -55,9 +55,10 @@ struct HeldForce {
 struct Spring {
   Vec3 force = Vec3::Zero();  ///< N, world
   double stiffness = 0.0;     ///< N/m, above 0: the most by which it changes with a motion
-  /// J, the energy whose slope it is, 0 where it ends: below 0 in a well. Not told: that of a spring that draws so hard.
+  /// J, the energy whose slope it is, 0 where it ends: below 0 in a well. Not told: that of a spring that draws so
+  /// hard.
   std::optional<double> stored = std::nullopt;
-  bool keeps = false;         ///< no energy's slope: it holds whatever is put into it
+  bool keeps = false;  ///< no energy's slope: it holds whatever is put into it
 };
 
 /// Energy that the hand has put in beyond what the forces hold, and that they may give back. At no tick has the hand

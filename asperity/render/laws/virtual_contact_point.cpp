@@ -243,7 +243,7 @@ Vec3 arrival_normal(const Felt& felt, const Vec3& probe, Held& state) noexcept {
 
 /// Keeps state.normal: the gradient's direction, held where that cannot be trusted. `g`: less than the band.
 Pull spring_at(const Felt& felt, const Trust& trust, double band, const Potential& here, const Vec3& probe,
-                 Held& state) noexcept {
+               Held& state) noexcept {
   const double g = here.value;
   Pull spring;
   spring.foot = probe - g * here.gradient;

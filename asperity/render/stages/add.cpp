@@ -234,7 +234,8 @@ void settle_parts(Tick& tick) noexcept {
     Giver cause = cause_of(tick, *strongest->touch, tick.state.stiffness, local);
     for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
     tick.state.stiffness = local;
-    share = account.hold(cause, held, {spring, stiffness, tick.parts.size() == 1 ? tick.parts[0].law.stored : std::nullopt});
+    share = account.hold(cause, held,
+                         {spring, stiffness, tick.parts.size() == 1 ? tick.parts[0].law.stored : std::nullopt});
   } else {
     tick.state.stiffness = 0.0F;
     account.release(held);
