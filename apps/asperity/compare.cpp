@@ -111,6 +111,7 @@ Result<Column> run_law(const Experiment& experiment, const Rival& rival, const S
   column.entry.law = rival.name;
   column.entry.series = derive_series(run.records, changed.scene, changed.path, judged);
   column.entry.metrics = measure_run(run.records, column.entry.series, changed.path);
+  column.entry.metrics.energy.account = account_rows(run.account);
   column.hash = run.hash;
   column.records = std::move(run.records);
   return column;

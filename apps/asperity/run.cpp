@@ -46,6 +46,7 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
   ASPERITY_CHECK(std::move(written));
   ASPERITY_CHECK(std::move(fetched));
   result.hash = force_hash(result.records);
+  result.account = state.account;
   return result;
 }
 

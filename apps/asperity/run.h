@@ -20,6 +20,7 @@ struct RunResult {
   std::vector<TraceRecord> records;
   SessionSummary summary;
   std::uint64_t hash = 0;  ///< of the forces
+  EnergyAccount account;   ///< as the run left it
 };
 
 /// Whether the stroke's ticks can be kept in memory. Errors: too_large. [main]

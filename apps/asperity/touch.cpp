@@ -77,6 +77,7 @@ Result<RunReport> build_report(const Experiment& experiment, const RunResult& ru
   if (progress) progress("measuring", 0.0);
   report.series = derive_series(run.records, experiment.scene, experiment.path);
   report.metrics = measure_run(run.records, report.series, experiment.path);
+  report.metrics.energy.account = account_rows(run.account);
   if (report.metrics.ticks.contact == 0) report.origin.warnings.push_back("the probe never touched anything");
   if (with_picture) {
     ASPERITY_TRY(report.picture, render_picture(experiment.scene, experiment.path, run.records, {}, progress));

@@ -275,6 +275,7 @@ window.addEventListener("error", (event) => {
     series_plot(page, law.force_time, { title: "Force", x: "time (s)", y: "N", unit: "s", group: "time", colours: forces });
     series_plot(page, law.energy_time, { title: "Energy", hint: "Work on the hand since the start, energy stored in the contact's spring, and their sum. A passive contact never lets the sum rise.",
       x: "time (s)", y: "mJ", unit: "s", group: "time", colours: ["#4a86cf", "#228833", "#d0475a"] });
+    draw_account();
     if (law.follow_time)
       series_plot(page, law.follow_time, { title: "Follow error", hint: follow_hint, x: "time (s)", y: "%", unit: "s", group: "time", zero: true, colours: ["#228833"] });
     section("Spectra and cost");
@@ -285,6 +286,24 @@ window.addEventListener("error", (event) => {
     draw_histogram(page, law.update_histogram, law.numbers);
     draw_numbers(law.numbers);
     draw_foot();
+  }
+
+  // What would have given more than the hand had put in, law by law.
+  function draw_account() {
+    const rows = data.laws.flatMap((law) => law.numbers.account.map((row) => [law.law, ...row]));
+    if (rows.length === 0) return;
+    make(page, "p", "hint", "What would have given the hand more than it had put in, and how much of that was paid: from what it had put in elsewhere, or by the scene's change power. " +
+      "The rest was refused: that force was softened.");
+    const table = make(make(page, "div", "scroll"), "table");
+    const head = make(make(table, "thead"), "tr");
+    for (const name of ["law", "giver", "asked (mJ)", "paid (mJ)", "refused (mJ)"]) make(head, "th", "", name);
+    const body = make(table, "tbody");
+    for (const [law, giver, ...energies] of rows) {
+      const row = make(body, "tr");
+      make(row, "td", "", law);
+      make(row, "td", "", giver);
+      for (const energy of energies) make(row, "td", "", number(energy));
+    }
   }
 
   // --- several laws ---
@@ -378,6 +397,7 @@ window.addEventListener("error", (event) => {
     draw_detection();
     section("Energy, spectra");
     law_plot(page, "energy_time", 3, { title: "Work + stored energy", hint: "A passive contact never lets it rise.", x: "time (s)", y: "mJ", unit: "s" });
+    draw_account();
     law_plot(page, "spectrum_distance", 1, { title: "Normal force over distance", x: "spatial frequency (1/mm)", y: "N / \u221a(1/mm)", unit: "/mm", logarithmic: true });
     law_plot(page, "spectrum_distance", 2, { title: "Tangential force over distance", x: "spatial frequency (1/mm)", y: "N / \u221a(1/mm)", unit: "/mm", logarithmic: true });
     draw_foot();

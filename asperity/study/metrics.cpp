@@ -334,6 +334,15 @@ std::vector<MetricRow> metric_rows(const RunMetrics& m) {
           {nullptr, "peak_tangential_per_mm", m.spectrum.tangential_distance.peak_frequency / milli}};
 }
 
+std::vector<EnergyMetrics::Asked> account_rows(const EnergyAccount& account) {
+  std::vector<EnergyMetrics::Asked> rows;
+  for (const auto& [giver, name] : Names<Giver>::table) {
+    const EnergyAccount::Flow& flow = account.flow(giver);
+    if (flow.asked > 0.0) rows.push_back({name, flow.asked, flow.paid});
+  }
+  return rows;
+}
+
 std::string metrics_json(const RunMetrics& m) {
   // What is no number is written as null.
   nlohmann::json json;
@@ -343,6 +352,11 @@ std::string metrics_json(const RunMetrics& m) {
   for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit)
     json["ticks"]["flags"][flag_name(bit)] = m.ticks.flags[bit];
   json["energy"]["loops"] = m.energy.loops;
+  json["energy"]["account"] = nlohmann::json::array();
+  for (const EnergyMetrics::Asked& row : m.energy.account) {
+    json["energy"]["account"].push_back(
+        {{"giver", row.giver}, {"asked", row.asked}, {"paid", row.paid}, {"refused", row.asked - row.paid}});
+  }
   const auto direction = [](const DirectionMetrics& d) {
     return nlohmann::json{{"samples", d.samples}, {"mean", d.mean}, {"p99", d.p99}, {"max", d.max}};
   };

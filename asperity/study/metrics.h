@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "asperity/render/energy/account.h"
 #include "asperity/study/follow.h"
 #include "asperity/study/series.h"
 #include "asperity/study/spectrum.h"
@@ -70,7 +71,18 @@ struct EnergyMetrics {
   double generated = 0.0;     ///< largest rise of work + stored energy from any earlier tick; 0 for a passive contact
   std::vector<double> loops;  ///< work + change of stored energy of each full loop (closed, or there and back)
   double mean_loop = 0.0;     ///< not-a-number without a full loop
+  /// What would have given more than the hand had put in: who, how much (J), and how much of it the account paid.
+  /// Givers that never asked are left out. Of the run itself: its trace does not tell.
+  struct Asked {
+    std::string giver;
+    double asked = 0.0;
+    double paid = 0.0;
+  };
+  std::vector<Asked> account;
 };
+
+/// What a run's account has been asked for. [any]
+std::vector<EnergyMetrics::Asked> account_rows(const EnergyAccount& account);
 
 /// Ticks that had each flag, and what the safety stage changed.
 struct TickMetrics {

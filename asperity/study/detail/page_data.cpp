@@ -145,6 +145,11 @@ json numbers(const RunMetrics& m) {
   unknown_without(m.height.samples, {"height_max_um"});
   data["loops_mj"] = json::array();
   for (const double energy : m.energy.loops) data["loops_mj"].push_back(significant(energy * milli));
+  data["account"] = json::array();
+  for (const EnergyMetrics::Asked& row : m.energy.account) {
+    data["account"].push_back({row.giver, significant(row.asked * milli), significant(row.paid * milli),
+                               significant((row.asked - row.paid) * milli)});
+  }
   data["flags"] = json::object();
   for (std::size_t bit = 0; bit < m.ticks.flags.size(); ++bit) {
     if (m.ticks.flags[bit] > 0) data["flags"][flag_name(bit)] = m.ticks.flags[bit];
