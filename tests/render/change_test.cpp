@@ -97,7 +97,7 @@ TEST(Change, A_refitted_mesh_takes_the_proxy_along) {
   }
 }
 
-// A surface that rises under a resting hand whose tank is empty may not do work on it; with power it may.
+// A surface that rises under a resting hand whose account is empty may not do work on it; with power it may.
 TEST(Change, A_rising_instance_pushes_with_what_it_is_given) {
   const MeshSurface base = sheet();
   Motion rising;
@@ -304,15 +304,15 @@ TEST(Change, Zooming_while_touched_changes_no_force) {
       }
       const Vec3 before = touch(plain, state, hand).wrench.force;
       ASSERT_LT(before.x(), -0.1) << law;
-      const double tank = state.account.level();
+      const double account = state.account.level();
       const Vec3 after = touch(zoomed, state, hand).wrench.force;
       EXPECT_NEAR((after - before).norm(), 0.0, 2e-3) << law << " " << zoom;
-      EXPECT_NEAR(state.account.level(), tank, 1e-6) << law << " " << zoom;
+      EXPECT_NEAR(state.account.level(), account, 1e-6) << law << " " << zoom;
     }
   }
 }
 
-// Conveyors under a still hand with an empty tank: friction, damping and viscosity give nothing.
+// Conveyors under a still hand with an empty account: friction, damping and viscosity give nothing.
 TEST(Change, A_moving_surface_drags_no_more_than_is_paid_for) {
   const MeshSurface base = sheet(0.2);
   for (const char* law : {"proxy", "mesostructure", "god-object"}) {

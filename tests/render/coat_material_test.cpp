@@ -271,7 +271,7 @@ TEST(View, H_V_a_feature_vanishes_below_one_pixel_and_returns_on_zoom) {
   EXPECT_GT(felt.back(), 3e-5);
 }
 
-// T10: a level change moves the surface under the hand; what that would give comes from the tank.
+// T10: a level change moves the surface under the hand; what that would give comes from the account.
 TEST(View, T10_level_changes_pay_from_the_tank) {
   const MeshSurface base = sheet();
   DetailSettings detail;

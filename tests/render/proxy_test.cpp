@@ -318,29 +318,29 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
     touch(before, state, Vec3(1e-3, 0.0, 2e-3));
     touch(before, state, probe);
     const double stored = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
-    const double tank = state.account.level();
+    const double account = state.account.level();
     const ForceSample felt = touch(after, state, probe);
     const double stretch = (felt.proxy - probe).norm();
     const double now = 0.5 * felt.wrench.force.norm() * stretch;
     EXPECT_GT(felt.wrench.force.norm(), 0.0);
-    EXPECT_LE(now, stored + tank + 1e-12);
-    EXPECT_EQ(felt.flags.has(TickFlag::energy_limited), tank < 2.0 * stored);
+    EXPECT_LE(now, stored + account + 1e-12);
+    EXPECT_EQ(felt.flags.has(TickFlag::energy_limited), account < 2.0 * stored);
   }
   {
-    // After much sliding the tank can pay more.
+    // After much sliding the account can pay more.
     ProxyState state;
     touch(before, state, Vec3(1e-3, 0.0, 2e-3));
     for (int i = 0; i < 4000; ++i) touch(before, state, probe + Vec3(5e-3 * std::sin(0.01 * i), 0.0, 0.0));
     touch(before, state, probe);
-    const double tank = state.account.level();
-    EXPECT_GT(tank, 1e-3);
+    const double account = state.account.level();
+    EXPECT_GT(account, 1e-3);
     ForceSample felt;
     // Handed over within 10 ms.
     for (int i = 0; i < 300; ++i) {
       felt = touch(after, state, probe);
       EXPECT_FALSE(felt.flags.has(TickFlag::energy_limited));
     }
-    EXPECT_LT(state.account.level(), tank);
+    EXPECT_LT(state.account.level(), account);
     EXPECT_NEAR(felt.wrench.force.norm(), 3.0 * stiffness * (felt.proxy - probe).norm(), 1e-9);
   }
 }
@@ -358,7 +358,7 @@ TEST(ProxyEnergy, a_relief_that_rises_over_a_resting_probe_gives_no_more_than_wa
   touch(before, state, Vec3(1e-3, 2e-3, 5e-3));
   touch(before, state, probe);
   const double stored = 0.5 * stiffness * (state.proxy - probe).squaredNorm();
-  const double tank = state.account.level();
+  const double account = state.account.level();
   double most = 0.0;
   for (int i = 0; i < 20; ++i) {
     const ForceSample felt = touch(after, state, probe);
@@ -366,7 +366,7 @@ TEST(ProxyEnergy, a_relief_that_rises_over_a_resting_probe_gives_no_more_than_wa
     most = std::max(most, 0.5 * felt.wrench.force.norm() * (felt.proxy - probe).norm());
   }
   EXPECT_GT(most, 0.0);
-  EXPECT_LE(most, stored + tank + 1e-12);
+  EXPECT_LE(most, stored + account + 1e-12);
 }
 
 }  // namespace
