@@ -84,6 +84,7 @@ RC_GTEST_PROP(ProxyInvariants, the_proxy_never_moves_away_from_the_probe, (std::
   Wanderer wanderer(rng, surface->bounds());
   ProxyState state;
   Vec3 before = wanderer.next();
+  bool cut = false;
   touch(scene, state, before);
   for (int i = 0; i < 200; ++i) {
     const Vec3 probe = wanderer.next();
@@ -91,7 +92,12 @@ RC_GTEST_PROP(ProxyInvariants, the_proxy_never_moves_away_from_the_probe, (std::
     const ForceSample felt = touch(scene, state, probe);
     // A point that touches rests on the relief itself, one that does not has no skin either: rounding alone.
     RC_ASSERT((state.proxy - probe).norm() <= (before - probe).norm() + 2.0 * surface->skin());
-    RC_ASSERT(!felt.flags.has(TickFlag::energy_limited));
+    // Unless friction's cone has cut the last force off, as at a crease: then the hand has put less in than the spring
+    // holds, which it feels until it lets go of some.
+    const bool limited = felt.flags.has(TickFlag::energy_limited);
+    RC_ASSERT(cut || !limited);
+    cut = (cut && limited) || (still > 0.0 && felt.flags.has(TickFlag::contact) &&
+                               felt.wrench.force.norm() < 0.9999 * stiffness * (state.proxy - probe).norm());
   }
 }
 

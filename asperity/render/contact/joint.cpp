@@ -494,6 +494,7 @@ void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact
   // The slope that the normal stands for, times the push.
   constexpr double least_rise = 0.1;
   const double rise = std::max(least_rise, shading.dot(answer.normal));
+  answer.turns = true;
   answer.turn = answer.force.norm() / rise * (shading - shading.dot(answer.normal) * answer.normal);
 }
 

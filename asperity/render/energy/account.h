@@ -59,6 +59,8 @@ struct Spring {
   /// hard.
   std::optional<double> stored = std::nullopt;
   bool keeps = false;  ///< no energy's slope: it holds whatever is put into it
+  /// J, that so strong a spring holds. [servo]
+  [[nodiscard]] double least() const noexcept { return force.squaredNorm() / (2.0 * stiffness); }
 };
 
 /// Energy that the hand has put in beyond what the forces hold, and that they may give back. At no tick has the hand
@@ -84,9 +86,11 @@ class EnergyAccount {
   /// Begins a tick: books what the forces that nothing holds have done since the last one. `capacity`: J. At the
   /// first one what is held is nobody's gift: the hand begins with it. [servo]
   void open(const Vec3& moved, double capacity, bool first) noexcept {
-    level_ -= loose_.dot(moved) - advanced_;
-    loose_ = Vec3::Zero();
-    advanced_ = 0.0;
+    if (loose_ != Vec3::Zero()) {
+      level_ -= loose_.dot(moved) - advanced_;
+      loose_ = Vec3::Zero();
+      advanced_ = 0.0;
+    }
     stiffness_ = 0.0;
     first_ = first;
     moved_ = moved;
@@ -114,60 +118,28 @@ class EnergyAccount {
   /// The share that may be rendered of a force that is held: as much as the frozen force holds after the hand's motion,
   /// and as the account pays. Remembers what is rendered. [servo]
   double hold(Giver giver, HeldForce& held, const Spring& spring) noexcept {
-    // Of sums of products: a spring that is held at rest is not to be softened by its last digit.
-    constexpr double rounding = 1e-9;
-    // As it is remembered.
-    const auto stiffness = static_cast<double>(static_cast<float>(spring.stiffness));
-    const double least = spring.force.squaredNorm() / (2.0 * stiffness);
     // What the hand has really put in, and what the force, held still over the tick, gave too much or took too little
-    // of it: by as much as it has changed over the hand's motion, unless something else has changed it.
+    // of it.
     const double put_in = held.energy - held.force.dot(moved_);
-    double slope = held.stiffness > 0.0F ? static_cast<double>(held.stiffness) : stiffness;
-    const double way = moved_.squaredNorm();
-    double hold = 0.5 * slope * way;
-    if (giver == Giver::spring && !held.softened) {
-      constexpr double third_order = 0.1;
-      const double seen = way > 0.0 ? std::sqrt((spring.force - held.force).squaredNorm() / way) : 0.0;
-      // Twice: all of the change may be at the beginning, where two slopes meet.
-      slope = std::max(slope, 2.0 * seen) + third_order * slope;
-      hold = 0.5 * slope * way;
-    } else if (giver == Giver::stiffness || held.softened) {
-      // Of what goes on as stiff as it was: the rest is the place's, not the motion's.
-      const double before = static_cast<double>(held.stiffness) / stiffness;
-      hold = std::min(hold, 0.5 * (held.force - before * spring.force).dot(moved_));
-    }
-    const double before = put_in + hold;
-    stiffness_ += slope;
-    double now = spring.stored.value_or(least);
+    const double stiffness = held.stiffness > 0.0F ? static_cast<double>(held.stiffness) : spring.stiffness;
+    const double left = put_in + 0.5 * stiffness * moved_.squaredNorm();
+    double now = spring.stored ? *spring.stored : spring.least();
     if (spring.keeps) now = std::max(now, put_in);
-    // Less would do: by so much the frozen force can give at most.
-    const double needed = std::min(now, least);
-    double share = 1.0;
-    if (now <= before) {
-      fill(put_in - now);
-    } else if (!first_) {
-      const double wanted = needed - before;
-      const double paid = wanted > rounding * std::abs(needed) ? pay(giver, wanted) : 0.0;
-      now = before + paid;
-      if (now - needed < -rounding * std::abs(needed)) {
-        share = share_of(now, needed, static_cast<double>(held.stiffness) / stiffness);
-        now = share * needed;
-      }
-    }
-    // Never free while it is held.
-    constexpr double faintest = 1e-12;
-    held = {share * spring.force, now, static_cast<float>(std::max(share, faintest) * stiffness), share != 1.0};
-    return share;
+    if (!(now <= left) || held.softened || giver == Giver::stiffness) return hold_less(giver, held, spring, put_in, now);
+    stiffness_ += stiffness;
+    fill(put_in - now);
+    held = {spring.force, now, static_cast<float>(spring.stiffness), false};
+    return 1.0;
   }
   /// What was held is let go: what the hand has put into it may come back later. [servo]
   void release(HeldForce& held) noexcept {
     if (!(held.stiffness > 0.0F)) return;
-    const auto slope = static_cast<double>(held.stiffness);
+    const auto stiffness = static_cast<double>(held.stiffness);
     const double put_in = held.energy - held.force.dot(moved_);
     fill(put_in);
     // Out of a well: what is missing to its edge.
-    level_ += std::min(0.0, put_in + 0.5 * slope * moved_.squaredNorm());
-    stiffness_ += slope;
+    level_ += std::min(0.0, put_in + 0.5 * stiffness * moved_.squaredNorm());
+    stiffness_ += stiffness;
     held = {};
   }
   /// The share that may be rendered of a force that nothing holds, over the tick that comes: against the hand all of
@@ -214,6 +186,47 @@ class EnergyAccount {
   void take(const Vec3& force) noexcept { loose_ += force; }
 
  private:
+  /// What is left of `hold` where it is not plain that all of the force may be rendered.
+  [[gnu::noinline]] double hold_less(Giver giver, HeldForce& held, const Spring& spring, double put_in,
+                                     double now) noexcept {
+    // Of sums of products: a spring that is held at rest is not to be softened by its last digit.
+    constexpr double rounding = 1e-9;
+    const auto before = static_cast<double>(held.stiffness);
+    double stiffness = before > 0.0 ? before : spring.stiffness;
+    const double way = moved_.squaredNorm();
+    double lag = 0.5 * stiffness * way;
+    if (giver == Giver::spring && !held.softened) {
+      // By as much as it has changed over the hand's motion, which alone has changed it. Twice: all of it may be at the
+      // beginning, where two slopes meet.
+      constexpr double third_order = 0.1;
+      const double seen = way > 0.0 ? std::sqrt((spring.force - held.force).squaredNorm() / way) : 0.0;
+      stiffness = std::max(stiffness, 2.0 * seen) + third_order * stiffness;
+      lag = 0.5 * stiffness * way;
+    } else if (giver == Giver::stiffness || held.softened) {
+      // Of what goes on as stiff as it was: the rest is the place's, not the motion's.
+      lag = std::min(lag, 0.5 * (held.force - before / spring.stiffness * spring.force).dot(moved_));
+    }
+    stiffness_ += stiffness;
+    const double left = put_in + lag;
+    // Less than its potential would do: by so much the frozen force can give at most.
+    const double needed = std::min(now, spring.least());
+    double share = 1.0;
+    if (now <= left) {
+      fill(put_in - now);
+    } else if (!first_) {
+      const double wanted = needed - left;
+      const double paid = wanted > rounding * std::abs(needed) ? pay(giver, wanted) : 0.0;
+      now = left + paid;
+      if (now - needed < -rounding * std::abs(needed)) {
+        share = share_of(now, needed, before / spring.stiffness);
+        now = share * needed;
+      }
+    }
+    // Never free while it is held.
+    constexpr double faintest = 1e-12;
+    held = {share * spring.force, now, static_cast<float>(std::max(share, faintest) * spring.stiffness), share != 1.0};
+    return share;
+  }
   /// The share of a force with the energy `now` that has `allowed`, which is less. In a well that is more than all of
   /// it: no shallower than it was, and no steeper either (`most`).
   double share_of(double allowed, double now, double most) noexcept {

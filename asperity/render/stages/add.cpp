@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "asperity/render/contact/fine.h"
 #include "asperity/render/contact/level.h"
@@ -139,18 +140,16 @@ void tell(Tick& tick, double share) noexcept {
 
 /// Renders a share of what a contact pushes with, and of the friction and texture that go by it.
 void soften(Tick& tick, double share, LawForce& law) noexcept {
-  if (share == 1.0) return;
   tell(tick, share);
   law.force *= share;
   law.spring *= share;
   law.friction *= share;
   law.texture *= share;
-  law.turn *= share;
+  if (law.turns) law.turn *= share;
 }
 
 /// Pays for all that a contact gives beside its spring, which is paid for already. World frame.
 void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
-  if (touch.facts->printed) return;
   EnergyAccount& account = tick.state.account;
   Contact& contact = *touch.contact;
   const Instance& instance = *touch.instance;
@@ -172,7 +171,7 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
   } else {
     account.release(contact.drag);
   }
-  if (!law.turn.isZero(0.0)) {
+  if (law.turns) {
     const double share = account.spend(Giver::shading, law.turn, ahead);
     law.turn *= share;
     law.force += law.turn;
@@ -187,6 +186,12 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
   } else {
     account.take(loose);
   }
+}
+
+/// Whether a contact gives anything beside its spring, or has.
+bool has_loose(const Touched& touch, const LawForce& law) noexcept {
+  return !touch.facts->printed && (touch.facts->adds_friction || law.turns || law.force != law.spring ||
+                                   touch.contact->drag.stiffness > 0.0F);
 }
 
 /// World frame.
@@ -206,43 +211,53 @@ void settle_law(Tick& tick, const Touched& touch, const Material& material, LawF
     const auto local = static_cast<float>(law.local > 0.0 ? law.local : material.stiffness);
     const Giver cause = cause_of(tick, touch, touch.contact->stiffness, local);
     touch.contact->stiffness = local;
-    soften(tick, account.hold(cause, held, {law.spring, stiffness, law.stored, law.keeps}), law);
+    const double share = account.hold(cause, held, {law.spring, stiffness, law.stored, law.keeps});
+    if (share != 1.0) soften(tick, share, law);
   } else {
     touch.contact->stiffness = 0.0F;
     account.release(held);
   }
-  settle_loose(tick, touch, law);
+  if (has_loose(touch, law)) settle_loose(tick, touch, law);
 }
 
-/// Pays for the proxy: what its parts hold together, then the rest of each.
-void settle_parts(Tick& tick) noexcept {
+/// Pays for what the proxy's parts hold together; answers the share that is rendered.
+double settle_spring(Tick& tick) noexcept {
   EnergyAccount& account = tick.state.account;
   HeldForce& held = tick.state.spring;
   const Part* strongest = nullptr;
-  Vec3 spring = Vec3::Zero();
-  double stiffness = 0.0;
+  Spring spring;
   for (const Part& part : tick.parts) {
     if (!part.law.contact) continue;
-    spring += part.law.spring;
     const double own = part.law.stiffness > 0.0 ? part.law.stiffness : part.stiffness;
-    if (own > stiffness) strongest = &part;
-    stiffness = std::max(stiffness, own);
+    if (own > spring.stiffness) {
+      strongest = &part;
+      spring.stiffness = own;
+    }
+    spring.force += part.law.spring;
   }
-  double share = 1.0;
-  if (strongest != nullptr) {
-    const auto local = static_cast<float>(strongest->stiffness);
-    Giver cause = cause_of(tick, *strongest->touch, tick.state.stiffness, local);
-    for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
-    tick.state.stiffness = local;
-    share = account.hold(cause, held,
-                         {spring, stiffness, tick.parts.size() == 1 ? tick.parts[0].law.stored : std::nullopt});
-  } else {
+  if (strongest == nullptr) {
     tick.state.stiffness = 0.0F;
     account.release(held);
+    return 1.0;
   }
+  const auto local = static_cast<float>(strongest->stiffness);
+  const float before = std::exchange(tick.state.stiffness, local);
+  Giver cause = before > 0.0F && local != before ? Giver::stiffness : Giver::spring;
+  if (tick.changed || tick.surfaces_moved) {
+    cause = cause_of(tick, *strongest->touch, before, local);
+    for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
+  }
+  if (tick.parts.size() == 1) spring.stored = strongest->law.stored;
+  return account.hold(cause, held, spring);
+}
+
+/// Pays for the proxy, and then for the rest of each part.
+void settle_parts(Tick& tick) noexcept {
+  if (tick.parts.empty() && tick.state.spring.stiffness == 0.0F) return;
+  const double share = settle_spring(tick);
   for (Part& part : tick.parts) {
-    soften(tick, share, part.law);
-    settle_loose(tick, *part.touch, part.law);
+    if (share != 1.0) soften(tick, share, part.law);
+    if (has_loose(*part.touch, part.law)) settle_loose(tick, *part.touch, part.law);
   }
 }
 
