@@ -13,6 +13,7 @@
 #include "asperity/core/math.h"
 #include "asperity/core/named_numbers.h"
 #include "asperity/core/names.h"
+#include "asperity/core/option.h"
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/place.h"
 #include "asperity/core/progress.h"

@@ -51,16 +51,25 @@ void add_scenes(Arguments& program, Console& console, Action& action) {
 }
 
 void add_schema(Arguments& program, Console& console, Action& action) {
-  Arguments command = program.command("schema", "Print the JSON Schema of scene files");
+  Arguments command = program.command("schema", "Print the JSON Schema of scene files, or what one key is");
+  auto key = std::make_shared<std::string>();
+  auto page = std::make_shared<bool>(false);
+  command.option("KEY", *key, "Say what this key is: stroke.speed, coat.height, or a kind of object");
+  command.flag("--page", *page, "Print the reference page of all keys (docs/scene.md)");
   add_console_options(command, console, false);
   command.closing_words(
       "Every key with its unit, range and default. Editors complete and check scenes with it (\"$schema\": "
-      "\"scene.schema.json\").\n"
-      "Example:\n"
-      "  asperity schema > scene.schema.json");
-  command.when_called([&action] {
-    action = []() -> Result<int> {
-      std::cout << scene_schema_json();
+      "\"scene.schema.json\" beside the scene).\n"
+      "Examples:\n"
+      "  asperity schema > scene.schema.json\n"
+      "  asperity schema stroke.speed");
+  command.when_called([key, page, &action] {
+    action = [key, page]() -> Result<int> {
+      std::string text = *page ? scene_page() : scene_schema_json();
+      if (!key->empty()) {
+        ASPERITY_TRY(text, scene_key_help(*key));
+      }
+      std::cout << text;
       return exit_success;
     };
   });

@@ -61,6 +61,14 @@ std::string accepted_units(Dimension dimension) {
   return list;
 }
 
+std::vector<std::string> unit_names(Dimension dimension) {
+  std::vector<std::string> names;
+  for (const Unit& unit : units_of(dimension)) {
+    if (!unit.name.empty()) names.emplace_back(unit.name);
+  }
+  return names;
+}
+
 Result<double> parse_quantity(std::string_view text, Dimension dimension) {
   const std::string_view whole = trimmed(text);
   const auto fail = [&](std::string what) {

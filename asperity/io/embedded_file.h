@@ -14,7 +14,5 @@ struct EmbeddedFile {
 
 /// The built-in scenes, in the order they are listed to people. [any]
 std::span<const EmbeddedFile> embedded_scenes();
-/// The schema of scene files. [any]
-std::span<const EmbeddedFile> embedded_schema();
 
 }  // namespace asperity

@@ -12,7 +12,6 @@ namespace asperity {
 namespace {
 
 constexpr int format_version = 1;
-constexpr std::size_t most_surfaces = 1024;
 
 Result<std::string> read_text(const std::filesystem::path& file) {
   std::error_code ignored;
@@ -139,30 +138,16 @@ SurfaceProjector projector(const Scene& scene) {
   };
 }
 
-/// The probe's radius ahead of the probe, whose defaults depend on the surfaces; what is wrong with it is said then.
+/// The probe's radius ahead of the probe, whose defaults depend on the surfaces.
 double probe_radius_of(const SceneJson* probe) {
-  if (probe == nullptr || !probe->is_object() || !probe->contains("radius")) return 0.0;
-  const SceneJson only = SceneJson{{"radius", (*probe)["radius"]}};
-  ObjectReader reader(only, "probe", "probe");
-  return reader.quantity("radius", Dimension::length, 0.0, Range::not_negative());
+  const bool given = probe != nullptr && probe->contains("radius");
+  return given ? from_option<double>(value_of((*probe)["radius"], OptionType::quantity(Dimension::length))) : 0.0;
 }
 
-/// A scene with effects needs no surfaces.
-Result<std::vector<Instance>> read_surfaces(ObjectReader& root, bool effects, SceneContext& context,
-                                            SceneJson& canonical) {
+Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& context, SceneJson& canonical) {
   const SceneJson* surfaces = root.raw("surfaces");
-  const char* accepted = "an array of surfaces, each at least {\"mesh\": file} or {\"volume\": file}";
   canonical = SceneJson::array();
-  if (surfaces == nullptr) {
-    if (effects) return std::vector<Instance>{};
-    root.fail("surfaces", "is missing", accepted);
-  } else if (!surfaces->is_array()) {
-    root.fail_type("surfaces", *surfaces, accepted);
-  } else if ((surfaces->empty() && !effects) || surfaces->size() > most_surfaces) {
-    root.fail("surfaces", fmt::format("has {} entries", surfaces->size()),
-              fmt::format("1 to {} surfaces", most_surfaces));
-  }
-  ASPERITY_CHECK(root.status());
+  if (surfaces == nullptr) return std::vector<Instance>{};
   std::vector<Instance> instances;
   for (std::size_t i = 0; i < surfaces->size(); ++i) {
     ASPERITY_TRY(ScenePart<Instance> part, read_surface((*surfaces)[i], fmt::format("surfaces[{}]", i), context));
@@ -185,32 +170,40 @@ SurfaceProjector drawn_as_it_is() {
   return [](const Vec3& p) { return SurfacePoint{p, Vec3::UnitY()}; };
 }
 
-void read_heading(ObjectReader& root, const std::string& fallback, std::string& name) {
-  const int version = root.integer("asperity", format_version, 1, 1000000);
-  if (version != format_version) {
-    root.fail("asperity", fmt::format("is {}, a newer format than this program reads", version),
-              fmt::format("{}", format_version), ErrorCode::file_unsupported);
-  }
-  name = root.text("name", fallback);
-  if (root.has("summary")) root.text("summary", {});
-  if (root.has("$schema")) root.text("$schema", {});
+/// Ahead of the structure, which a newer format may have another of.
+Status check_version(const SceneJson& json) {
+  const bool given = json.is_object() && json.contains("asperity") && json["asperity"].is_number_integer();
+  if (!given || json["asperity"] == format_version || json["asperity"] < format_version) return success();
+  return refused(ErrorCode::file_unsupported,
+                 fmt::format("is {}, a newer format than this program reads", json["asperity"].dump()), "asperity",
+                 fmt::format("{}", format_version));
+}
+
+std::string read_heading(ObjectReader& root, const std::string& fallback) {
+  root.get<int>("asperity");
+  const std::string name = root.get("name", fallback);
+  root.find<std::string>("summary");
+  root.find<std::string>("$schema");
+  return name;
 }
 
 Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem::path& folder,
                                     const std::string& fallback_name, const Progress& progress) {
+  ASPERITY_CHECK(check_version(json));
   ObjectReader root(json, "", "scene");
   ASPERITY_CHECK(root.status());
-  std::string name;
-  read_heading(root, fallback_name, name);
-  ASPERITY_CHECK(root.status());
-  ASPERITY_TRY(ScenePart<DeviceProfile> device, read_device(root.raw("device"), "device"));
-  ASPERITY_TRY(ScenePart<HandImpedance> hand, read_hand(root.raw("hand"), "hand"));
+  const std::string name = read_heading(root, fallback_name);
+  const auto whole = [&](const char* key) {
+    return root.has(key) ? *root.raw(key) : json_of(scene_object("scene").row(key, json)->fallback);
+  };
+  ASPERITY_TRY(ScenePart<DeviceProfile> device, read_device(whole("device"), "device"));
+  ASPERITY_TRY(ScenePart<HandImpedance> hand, read_hand(whole("hand"), "hand"));
   SceneContext context{folder, device.value, progress, {}, {}, probe_radius_of(root.raw("probe"))};
   SceneJson surfaces;
   SceneJson effects_json;
   ASPERITY_TRY(std::vector<FieldEffect> effects, read_effects(root, context, effects_json));
   const bool felt_alone = !effects.empty();
-  ASPERITY_TRY(std::vector<Instance> instances, read_surfaces(root, felt_alone, context, surfaces));
+  ASPERITY_TRY(std::vector<Instance> instances, read_surfaces(root, context, surfaces));
   const bool bodiless = instances.empty();
   const double stiffness =
       bodiless ? std::min(1000.0, device.value.max_stiffness) : instances.front().material.stiffness;

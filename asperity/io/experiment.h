@@ -48,7 +48,7 @@ struct Experiment {
   std::string canonical_json;
 };
 
-/// Reads a scene file (JSON, scenes/scene.schema.json). Paths in it are relative to it. Errors name file, key and what
+/// Reads a scene file (JSON, docs/scene.md). Paths in it are relative to it. Errors name file, key and what
 /// would be accepted; unknown keys are errors that suggest the nearest known one. [build]
 Result<Experiment> read_experiment(const std::filesystem::path& file, const Progress& progress = {});
 /// The same from text; `folder` is what relative paths start from, `name` stands for the file in messages. [build]
@@ -64,8 +64,13 @@ const std::vector<BuiltinScene>& builtin_scenes();
 /// The JSON text of a built-in scene. Errors: bad_value with the nearest name. [any]
 Result<std::string> builtin_scene_json(std::string_view name);
 
-/// The JSON Schema (draft 7) of scene files, scenes/scene.schema.json. [any]
+/// The JSON Schema (draft 7) of scene files, made from the table that they are read by. [any]
 std::string scene_schema_json();
+/// The reference page of scene files in Markdown, from the same table: docs/scene.md. [any]
+std::string scene_page();
+/// What a key of scene files is: "stroke.speed", "surfaces.coat.height", or a kind of object ("coat", "coat.height").
+/// Errors: bad_value with the nearest path. [any]
+Result<std::string> scene_key_help(std::string_view path);
 
 /// A copy of `experiment` in which every surface is felt by `law`. Errors: unsupported_pair. [build]
 Result<Experiment> with_law(const Experiment& experiment, const Law& law);

@@ -45,8 +45,4 @@ Result<std::string> builtin_scene_json(std::string_view name) {
                    "", fmt::format("{}", fmt::join(names, ", ")));
 }
 
-std::string scene_schema_json() {
-  return std::string(embedded_schema().front().text);
-}
-
 }  // namespace asperity

@@ -14,8 +14,9 @@ namespace {
 
 class CoatReader {
  public:
-  CoatReader(const SceneJson& json, const std::string& place, const TriangleMesh& mesh, SceneContext& context)
-      : reader_(json, place, "coat"),
+  CoatReader(const SceneJson& json, const std::string& place, const TriangleMesh& mesh, SceneContext& context,
+             std::string_view object)
+      : reader_(json, place, object),
         mesh_(mesh),
         context_(context),
         source_(reader_, context, "height_map", "coat", mesh.mean_edge()) {}
@@ -24,7 +25,7 @@ class CoatReader {
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(source_.read_source());
     read_mapping();
-    magnify_ = reader_.number("magnify", 1.0, Range::positive());
+    magnify_ = reader_.get<double>("magnify");
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(source_.read_scale(magnify_));
     ASPERITY_TRY(HeightMap heights, source_.build(wrap_, reconstruction_));
@@ -51,15 +52,15 @@ class CoatReader {
 
  private:
   void read_mapping() {
-    const std::optional<Mapping> given = reader_.choice_or_auto<Mapping>("mapping");
+    const std::optional<Mapping> given = reader_.get<std::optional<Mapping>>("mapping");
     mapping_ = given.value_or(mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar);
     if (!given && !mesh_.has_uvs()) {
       context_.note(
           "coat: the mesh has no texture coordinates, so the map is projected along the three axes (\"mapping\": "
           "\"triplanar\")");
     }
-    wrap_ = reader_.choice("wrap", Wrap::repeat);
-    reconstruction_ = reader_.choice("filter", Reconstruction::quadratic_bspline);
+    wrap_ = reader_.get<Wrap>("wrap");
+    reconstruction_ = reader_.get<Reconstruction>("filter");
   }
 
   Status check_amplitude(const HeightMap& heights) {
@@ -97,7 +98,7 @@ class CoatReader {
     const SceneJson* given = reader_.raw("tile");
     Vec2 tile = Vec2::Zero();
     if (given != nullptr && given->is_array()) {
-      tile = reader_.pair("tile", Dimension::length, Vec2::Ones(), Range::positive());
+      tile = reader_.get("tile", tile);
     } else if (given == nullptr && source_.sidecar()) {
       tile = source_.tile();
       reader_.write("tile", tile);
@@ -105,7 +106,7 @@ class CoatReader {
                                 source_.sidecar()->file));
     } else {
       const double fallback = share * mesh_.bounds().extent().maxCoeff() / magnify_;
-      const double width = reader_.quantity("tile", Dimension::length, fallback, Range::positive());
+      const double width = reader_.get("tile", fallback);
       tile = Vec2(width, width * aspect);
       if (given == nullptr)
         context_.note(
@@ -119,11 +120,7 @@ class CoatReader {
   void read_repeat() {
     const SceneJson* given = reader_.raw("repeat");
     if (given != nullptr && given->is_array()) {
-      const char* accepted = "a number above 0, or two [along s, along t]";
-      if (given->size() != 2) return reader_.fail("repeat", fmt::format("has {} numbers", given->size()), accepted);
-      if (are_numbers(*given, 2)) repeat_ = {(*given)[0].get<double>(), (*given)[1].get<double>()};
-      if (!are_numbers(*given, 2) || !(repeat_.minCoeff() > 0.0))
-        reader_.fail("repeat", "is no pair of numbers above 0", accepted);
+      repeat_ = reader_.get("repeat", repeat_);
       reader_.write("repeat", *given);
       return;
     }
@@ -135,7 +132,7 @@ class CoatReader {
       context_.note(fmt::format("coat: repeated {:.3g} times over the texture coordinates, so that one repeat is {}",
                                 fallback, format_length(magnify_ * source_.tile().x())));
     }
-    const double repeat = reader_.number("repeat", fallback, Range::positive());
+    const double repeat = reader_.get("repeat", fallback);
     repeat_ = Vec2(repeat, repeat);
   }
 
@@ -147,9 +144,7 @@ class CoatReader {
 
   /// Normals of the reconstruction where it is touched, or the papers' normal map of the heights (hrm-2010, section 4).
   Result<Mesostructure> with_own_normals(HeightMap heights, const Vec2& tile) {
-    static const std::vector<std::string> sources{"heights", "map"};
-    reader_.refuse({"green"}, "without normal_map");
-    const bool map = reader_.choice("normals", sources, 0) == 1;
+    const bool map = reader_.get<std::string>("normals") == "map";
     ASPERITY_CHECK(reader_.status());
     if (!map) return Mesostructure::build(std::move(heights), tile);
     ASPERITY_TRY(NormalMap normals, at_place(NormalMap::build(heights, tile), reader_.place_of("normals")));
@@ -158,10 +153,9 @@ class CoatReader {
 
   Result<Mesostructure> with_normals(HeightMap heights, const Vec2& tile) {
     if (reader_.raw("normal_map") == nullptr) return with_own_normals(std::move(heights), tile);
-    reader_.refuse({"normals"}, "beside normal_map");
-    const std::string name = reader_.text("normal_map", "");
+    const auto name = reader_.get("normal_map", std::string());
     const std::string place = reader_.place_of("normal_map");
-    const auto green = reader_.choice("green", GreenConvention::up);
+    const auto green = reader_.get<GreenConvention>("green");
     ASPERITY_CHECK(reader_.status());
     const std::filesystem::path path = context_.resolve(name);
     reader_.write("normal_map", path.string());
@@ -208,8 +202,8 @@ double texture_unit(const TriangleMesh& mesh) {
 }
 
 Result<ScenePart<CoatSource>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
-                                        SceneContext& context) {
-  return CoatReader(json, place, mesh, context).read();
+                                        SceneContext& context, std::string_view object) {
+  return CoatReader(json, place, mesh, context, object).read();
 }
 
 }  // namespace asperity

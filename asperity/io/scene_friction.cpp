@@ -2,64 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "asperity/io/detail/scene_fine.h"
 #include "asperity/io/detail/scene_heights.h"
 
 namespace asperity {
 namespace {
 
-/// Reads the members that the law takes; others are refused by name.
-class FrictionReader {
- public:
-  FrictionReader(ObjectReader& reader, FrictionKind kind) : reader_(reader) { law_.kind = kind; }
-
-  FrictionLaw read() {
-    const auto read = [&](const std::string& key) {
-      return key == "law" || takes(key) || (key == "formulation" && printed_otherwise());
-    };
-    reader_.refuse_unless(read, fmt::format("by the friction law \"{}\"", friction_name(law_.kind)));
-    if (printed_otherwise()) law_.formulation = reader_.choice("formulation", Formulation::consistent);
-    number("stiffness", Dimension::stiffness, Range::not_negative(), law_.stiffness);
-    number("damping", Dimension::damping, Range::not_negative(), law_.damping);
-    number("viscosity", Dimension::damping, Range::not_negative(), law_.viscosity);
-    number("break_away", Dimension::force, Range::not_negative(), law_.break_away);
-    number("stick_speed", Dimension::speed, Range::positive(), law_.stick_speed);
-    number("stribeck_speed", Dimension::speed, Range::positive(), law_.stribeck_speed);
-    number("exponent", Dimension::ratio, Range{0.5, 4.0}, law_.exponent);
-    number("adhesion", Dimension::ratio, Range{0.0, 0.9}, law_.adhesion);
-    return law_;
-  }
-
- private:
-  [[nodiscard]] bool takes(const std::string& key) const {
-    const auto& taken = friction_parameters(law_.kind);
-    return std::find(taken.begin(), taken.end(), key) != taken.end();
-  }
-  /// Whether the literal form is another one.
-  [[nodiscard]] bool printed_otherwise() const {
-    return law_.kind == FrictionKind::karnopp || law_.kind == FrictionKind::coulomb || law_.kind == FrictionKind::lugre;
-  }
-  void number(const char* key, Dimension dimension, const Range& range, double& value) {
-    if (takes(key)) value = reader_.quantity(key, dimension, value, range);
-  }
-
-  ObjectReader& reader_;
-  FrictionLaw law_;
-};
-
 Status read_law(const SceneJson& json, ObjectReader& material, Material& into) {
-  if (!json.is_string() && !json.is_object()) {
-    material.fail_type("friction", json, "a friction law's name, or an object with a law");
-    return material.status();
-  }
   const SceneJson wrapped = json.is_string() ? SceneJson{{"law", json}} : json;
   ObjectReader reader(wrapped, material.place_of("friction"), "friction");
-  reader.require("law", "a friction law's name");
-  const auto kind = reader.choice("law", FrictionKind::implicit_coulomb);
-  ASPERITY_CHECK(reader.status());
-  into.friction = FrictionReader(reader, kind).read();
+  reader.read_all(into.friction);
   into.friction_named = true;
   ASPERITY_CHECK(reader.status());
   ASPERITY_CHECK(at_place(validate(into.friction), reader.place()));
@@ -69,10 +21,10 @@ Status read_law(const SceneJson& json, ObjectReader& material, Material& into) {
 
 void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
   ObjectReader reader(json, material.place_of("lay"), "lay");
-  lay.still_ratio = reader.quantity("still_ratio", Dimension::ratio, 1.0, Range{0.0, 1.0});
-  lay.sliding_ratio = reader.quantity("sliding_ratio", Dimension::ratio, lay.still_ratio, Range{0.0, 1.0});
-  lay.formulation = reader.choice("formulation", Formulation::consistent);
-  if (reader.has("direction")) lay.direction = reader.quantity("direction", Dimension::angle, 0.0);
+  reader.read("still_ratio", lay.still_ratio);
+  lay.sliding_ratio = reader.get("sliding_ratio", lay.still_ratio);
+  reader.read("formulation", lay.formulation);
+  lay.direction = reader.find<double>("direction");
   material.take("lay", std::move(reader));
 }
 
@@ -81,11 +33,10 @@ Result<FrictionMap> read_friction_map(const SceneJson& json, ObjectReader& mater
   ASPERITY_CHECK(reader.status());
   HeightSourceReader source(reader, context, "image", "friction map", 0.0);
   ASPERITY_CHECK(source.read_source());
-  const double low = reader.number("low", 0.0, Range{0.0, 1e3});
-  const double high = reader.number("high", 1.0, Range{0.0, 1e3});
+  const auto low = reader.get<double>("low");
+  const auto high = reader.get<double>("high");
   FrictionMap map;
-  reader.require("tile", "size of one repeat: a length above 0, or two");
-  map.tile = reader.pair("tile", Dimension::length, map.tile, Range::positive());
+  reader.read("tile", map.tile);
   ASPERITY_CHECK(reader.status());
   // Nothing between two factors may lie outside them.
   ASPERITY_TRY(HeightMap factors, source.build_between(low, high, Wrap::repeat, Reconstruction::bilinear));

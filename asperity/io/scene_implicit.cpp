@@ -38,44 +38,31 @@ Reach reach_of(const ImplicitFeel& feel, const DeviceProfile& device) {
 /// A length, or "all" for as far as the inside goes.
 double read_band_inside(ObjectReader& reader, double fallback) {
   const SceneJson* value = reader.raw("band_inside");
-  if (value != nullptr && value->is_string() && *value == "all") {
-    reader.write("band_inside", "all");
-    return infinity;
-  }
-  return reader.optional_quantity("band_inside", Dimension::length, Range::positive()).value_or(fallback);
+  if (value == nullptr || *value != "all") return reader.find<double>("band_inside").value_or(fallback);
+  reader.write("band_inside", "all");
+  return infinity;
 }
 
 /// Voxel, resolution or budget; bands; rule.
 ConversionSettings read_conversion(ObjectReader& reader, const Box& bounds, const Reach& reach) {
   ConversionSettings settings;
-  const char* given = nullptr;
-  for (const char* key : {"voxel", "resolution", "budget"}) {
-    if (!reader.has(key)) continue;
-    if (given != nullptr)
-      reader.fail(key, fmt::format("is given beside {}", given), "one of voxel, resolution, budget");
-    given = key;
-  }
   const double longest = bounds.extent().maxCoeff();
   double voxel = longest / 64.0;  // of a budget nothing is known yet
   if (reader.has("voxel")) {
-    settings.voxel = voxel = reader.quantity("voxel", Dimension::length, 0.0, Range::positive());
+    settings.voxel = voxel = reader.get("voxel", 0.0);
   } else if (reader.has("budget")) {
     settings.budget_bytes = read_bytes(reader, "budget", 0);
   } else {
-    settings.resolution = static_cast<std::uint32_t>(reader.integer("resolution", 256, 8, 4096));
+    settings.resolution = reader.get<std::uint32_t>("resolution");
     voxel = longest / settings.resolution;
   }
   constexpr double spare = 3.0;  // voxels that reconstruction and rounding need beyond what is read
   const double outside = reach.outside > 0.0 ? reach.outside + spare * voxel : 0.0;
   const double inside = reach.inside > 0.0 ? reach.inside + spare * voxel : 0.0;
-  settings.band_outside =
-      reader.optional_quantity("band_outside", Dimension::length, Range::positive()).value_or(outside);
+  settings.band_outside = reader.find<double>("band_outside").value_or(outside);
   settings.band_inside = read_band_inside(reader, inside);
-  settings.rule = reader.choice("inside", InsideRule::automatic);
-  settings.shell_thickness =
-      reader.optional_quantity("shell_thickness", Dimension::length, Range::positive()).value_or(0.0);
-  if (settings.shell_thickness > 0.0 && settings.rule != InsideRule::shell && settings.rule != InsideRule::automatic)
-    reader.refuse({"shell_thickness"}, "by this rule of what is inside");
+  reader.read_all(settings);
+  settings.shell_thickness = reader.find<double>("shell_thickness").value_or(0.0);
   return settings;
 }
 
@@ -87,22 +74,19 @@ struct Texture {
 
 /// Noise. Nothing is read where there is no texture.
 Result<Texture> read_noise(const SceneJson& json, ObjectReader& implicit) {
-  static const std::vector<std::string> types{"gaussian", "gradient"};
   ObjectReader reader(json, implicit.place_of("texture"), "implicit texture");
-  const bool gaussian = reader.choice("type", types, 1) == 0;
-  const double amplitude = reader.quantity("amplitude", Dimension::length, 0.0002, Range::positive());
-  const std::uint64_t seed = reader.seed("seed", 1);
+  const bool gaussian = reader.get<std::string>("type") == "gaussian";
+  const auto amplitude = reader.get<double>("amplitude");
+  const auto seed = reader.get<std::uint64_t>("seed");
   Texture texture;
   if (gaussian) {
-    reader.refuse({"wavelength"}, "by Gaussian noise, whose grain is the voxel");
     constexpr double cut = 3.0;  // gaussian_noise cuts its deviates there
     texture.highest = cut * amplitude;
-    if (!reader.failed()) texture.height = gaussian_noise(amplitude, seed);
+    texture.height = gaussian_noise(amplitude, seed);
   } else {
-    const double wavelength = reader.quantity("wavelength", Dimension::length, 0.003, Range::positive());
     texture.highest = amplitude;
-    texture.wavelength = wavelength;
-    if (!reader.failed()) texture.height = gradient_noise(amplitude, wavelength, seed);
+    texture.wavelength = reader.get<double>("wavelength");
+    texture.height = gradient_noise(amplitude, texture.wavelength, seed);
   }
   ASPERITY_CHECK(reader.status());
   implicit.take("texture", std::move(reader));
@@ -112,35 +96,24 @@ Result<Texture> read_noise(const SceneJson& json, ObjectReader& implicit) {
 Result<std::vector<MaterialBrush>> read_brushes(const SceneJson* json, ObjectReader& implicit) {
   std::vector<MaterialBrush> brushes;
   if (json == nullptr) return brushes;
-  constexpr std::size_t most = 10000;
-  if (!json->is_array()) {
-    implicit.fail_type("materials", *json, "an array of objects with centre, radius and a material");
-  } else if (json->empty() || json->size() > most) {
-    implicit.fail("materials", fmt::format("has {} entries", json->size()), fmt::format("1 to {}", most));
-  }
-  ASPERITY_CHECK(implicit.status());
   SceneJson canonical = SceneJson::array();
   for (std::size_t i = 0; i < json->size(); ++i) {
     ObjectReader reader((*json)[i], implicit.place_of("materials", i), "material brush");
     MaterialBrush brush;
-    reader.require("centre", "three lengths");
-    brush.centre = reader.lengths("centre", Vec3::Zero());
-    brush.radius = reader.quantity("radius", Dimension::length, 0.005, Range::positive());
-    brush.falloff = reader.quantity("falloff", Dimension::length, 0.0, Range{0.0, brush.radius});
-    bool any = false;
-    const auto channel = [&](const char* key, Dimension dimension, const Range& range, float& value) {
-      if (!reader.has(key)) return;
-      any = true;
-      value = static_cast<float>(dimension == Dimension::ratio ? reader.number(key, 0.0, range)
-                                                               : reader.quantity(key, dimension, 0.0, range));
+    brush.centre = reader.get("centre", brush.centre);
+    brush.radius = reader.get<double>("radius");
+    brush.falloff = reader.get<double>("falloff");
+    if (!(brush.falloff <= brush.radius))
+      reader.fail("falloff", fmt::format("is {:.6g}", brush.falloff),
+                  fmt::format("a number 0 to {:.4g} (m)", brush.radius));
+    const auto channel = [&](const char* key, float& value) {
+      if (const auto given = reader.find<double>(key)) value = static_cast<float>(*given);
     };
-    channel("stiffness", Dimension::stiffness, Range::positive(), brush.material.stiffness);
-    channel("damping", Dimension::damping, Range::not_negative(), brush.material.damping);
-    channel("static_friction", Dimension::ratio, Range::not_negative(), brush.material.static_friction);
-    channel("dynamic_friction", Dimension::ratio, Range::not_negative(), brush.material.dynamic_friction);
-    channel("roughness", Dimension::ratio, Range::not_negative(), brush.material.roughness);
-    if (!any)
-      reader.fail("stiffness", "is missing, and so is every other property", "at least one property of a material");
+    channel("stiffness", brush.material.stiffness);
+    channel("damping", brush.material.damping);
+    channel("static_friction", brush.material.static_friction);
+    channel("dynamic_friction", brush.material.dynamic_friction);
+    channel("roughness", brush.material.roughness);
     ASPERITY_CHECK(reader.status());
     canonical.push_back(reader.canonical());
     brushes.push_back(brush);
@@ -190,13 +163,7 @@ class ImplicitReader {
 
   Status read(Instance& instance) {
     if (surface_.has("mesh")) ASPERITY_CHECK(read_mesh());
-    const std::string file = reader_.has("file") ? reader_.text("file", "") : std::string();
-    if (reader_.has("file") && file.empty()) reader_.fail("file", "is empty", "the name of a .vdb file");
-    if (!reader_.has("file")) reader_.refuse({"grid"}, "without a .vdb file");
-    if (mesh_ == nullptr && file.empty() && !surface_.failed())
-      surface_.fail("mesh", "is missing", "a mesh beside \"implicit\", or implicit.file with a .vdb file");
-    ASPERITY_CHECK(surface_.status());
-    ASPERITY_CHECK(reader_.status());
+    const std::string file = reader_.find<std::string>("file").value_or("");
     const SceneJson* noise = reader_.raw("texture");
     Texture texture;
     if (noise != nullptr && coat_) reader_.refuse({"texture"}, "beside a coat, which is the texture then");
@@ -206,8 +173,8 @@ class ImplicitReader {
     }
     if (coat_) texture = {coat_height(*coat_, mesh_->mesh()), coat_->amplitude_bound()};
     if (!texture.height) reader_.refuse({"redistance"}, "without a texture or a coat");
-    parts_.offset = reader_.quantity("offset", Dimension::length, 0.0, Range::not_negative());
-    parts_.reconstruction = reader_.choice("reconstruction", CellReconstruction::smooth);
+    parts_.offset = reader_.get<double>("offset");
+    parts_.reconstruction = reader_.get<CellReconstruction>("reconstruction");
     ASPERITY_TRY(const std::vector<MaterialBrush> brushes, read_brushes(reader_.raw("materials"), reader_));
     for (std::size_t i = 0; i < brushes.size() && !texture.height; ++i) {
       if (std::isnan(brushes[i].material.roughness)) continue;
@@ -219,8 +186,8 @@ class ImplicitReader {
     if (!brushes.empty()) ASPERITY_CHECK(paint(brushes));
     shortest_ = texture.wavelength;
     if (texture.height) ASPERITY_CHECK(lay_texture(texture.height));
-    instance.name = surface_.text("name", name_);
-    instance.sides = surface_.choice_or_auto<Sides>("sides");
+    instance.name = surface_.get("name", name_);
+    instance.sides = surface_.get<std::optional<Sides>>("sides");
     ASPERITY_CHECK(surface_.status());
     parts_.mesh = mesh_;
     ASPERITY_TRY(ImplicitSurface built, placed(ImplicitSurface::build(std::move(parts_))));
@@ -302,10 +269,8 @@ class ImplicitReader {
   }
 
   Status load(const std::string& file) {
-    reader_.refuse({"voxel", "resolution", "budget", "band_outside", "band_inside", "inside", "shell_thickness"},
-                   "with a .vdb file, which has its own");
     if (turned_) surface_.fail("up", "turns the mesh and not the .vdb file", "y beside implicit.file");
-    const std::string grid = reader_.text("grid", "");
+    const std::string grid = reader_.get("grid", std::string());
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(surface_.status());
     const std::filesystem::path path = context_.resolve(file);
@@ -354,7 +319,7 @@ class ImplicitReader {
   }
 
   Status lay_texture(const PointHeight& height) {
-    const auto mode = reader_.choice("redistance", Redistancing::redistanced);
+    const auto mode = reader_.get<Redistancing>("redistance");
     ASPERITY_CHECK(reader_.status());
     if (context_.progress) context_.progress("laying the texture", 0.0);
     ASPERITY_TRY(TexturedPotential result, placed(textured(*parts_.grid, height, mode, context_.progress)));
@@ -388,10 +353,6 @@ class ImplicitReader {
 }  // namespace
 
 Status read_implicit(ObjectReader& surface, const ImplicitFeel& feel, SceneContext& context, Instance& instance) {
-  surface.refuse({"volume", "iso"}, "beside \"implicit\"");
-  surface.refuse({"search", "on_overlap", "shell_directions"}, "by an implicit surface");
-  if (!surface.has("mesh")) surface.refuse({"coat", "up"}, "without a mesh");
-  ASPERITY_CHECK(surface.status());
   ObjectReader reader(*surface.raw("implicit"), surface.place_of("implicit"), "implicit");
   ASPERITY_CHECK(reader.status());
   return ImplicitReader(surface, reader, feel, context).read(instance);

@@ -13,123 +13,64 @@
 namespace asperity {
 namespace {
 
-const std::vector<std::string>& generator_names() {
-  static const std::vector<std::string> names{"icosphere", "M_a", "M_b",   "M_c", "M_d",   "M_e",
-                                              "M_f",       "M_G", "plane", "box", "random"};
-  return names;
-}
-
-const std::vector<std::string>& axis_names() {
-  static const std::vector<std::string> names{"x", "y", "z", "-x", "-y", "-z"};
-  return names;
-}
-
-/// Reads one generator's parameters; every one that it does not take is refused by name.
+/// Reads one generator's parameters.
 class GeneratorReader {
  public:
   GeneratorReader(ObjectReader& reader, SceneContext& context) : reader_(reader), context_(context) {}
 
   MeshSource generate(std::string_view generator) {
     if (generator == "icosphere" || generator == "M_d") return icosphere_source();
-    if (generator == "M_a") return trial_a();
+    if (generator == "M_a") return trial_mesh_a(trial_settings());
     if (generator == "M_b") return trial_b();
     if (generator == "M_c") return trial_c();
     if (generator == "M_e") return cup();
     if (generator == "M_f") return strip();
     if (generator == "M_G") return displaced();
     if (generator == "plane") return plane();
-    if (generator == "box") return box();
+    if (generator == "box") return box_mesh(reader_.get<Vec3>("size"));
     return blob();
   }
 
  private:
-  double length(const char* key, double fallback) {
-    return reader_.quantity(key, Dimension::length, fallback, Range{1e-9, 1e9});
-  }
-  void only(std::initializer_list<std::string_view> taken) {
-    const auto takes = [&](const std::string& key) {
-      return key == "generator" || std::find(taken.begin(), taken.end(), key) != taken.end();
-    };
-    reader_.refuse_unless(takes, "by this generator");
-  }
+  double number(const char* key) { return reader_.get<double>(key); }
+  int whole(const char* key) { return reader_.get<int>(key); }
 
   MeshSource icosphere_source() {
-    only({"subdivisions", "radius", "mean_edge"});
-    const int subdivisions = reader_.integer("subdivisions", 4, 0, 9);
-    if (reader_.has("radius") && reader_.has("mean_edge"))
-      reader_.fail("mean_edge", "is given beside radius", "one of the two");
-    if (!reader_.has("mean_edge")) return make([&] { return icosphere(subdivisions, length("radius", 0.04)); });
-    const double edge = length("mean_edge", 0.01);
-    return make([&] { return icosphere(subdivisions, icosphere_radius_for_edge(subdivisions, edge)); });
+    const int subdivisions = whole("subdivisions");
+    if (!reader_.has("mean_edge")) return icosphere(subdivisions, number("radius"));
+    return icosphere(subdivisions, icosphere_radius_for_edge(subdivisions, number("mean_edge")));
   }
 
   TrialMeshSettings trial_settings() {
     TrialMeshSettings settings;
-    settings.columns = reader_.integer("columns", settings.columns, 1, 1000);
-    settings.rows = reader_.integer("rows", settings.rows, 1, 1000);
-    settings.mean_edge = length("mean_edge", settings.mean_edge);
+    settings.columns = whole("columns");
+    settings.rows = whole("rows");
+    settings.mean_edge = number("mean_edge");
     return settings;
   }
-  double largest_fold() {
-    return reader_.quantity("largest_fold", Dimension::angle, std::numbers::pi / 30.0,
-                            Range{1e-3, std::numbers::pi / 4.0});
-  }
-  MeshSource trial_a() {
-    only({"columns", "rows", "mean_edge"});
-    const TrialMeshSettings settings = trial_settings();
-    return make([&] { return trial_mesh_a(settings); });
-  }
   MeshSource trial_b() {
-    only({"columns", "rows", "mean_edge", "largest_fold"});
     const TrialMeshSettings settings = trial_settings();
-    const double fold = largest_fold();
-    return make([&] { return trial_mesh_b(fold, settings); });
+    return trial_mesh_b(number("largest_fold"), settings);
   }
   MeshSource trial_c() {
-    only({"columns", "rows", "mean_edge", "fold_angles"});
     const TrialMeshSettings settings = trial_settings();
-    const std::vector<double> angles = fold_angles();
-    return make([&] { return trial_mesh_c(settings, angles); });
-  }
-
-  /// Angles between the faces at M_c's ridges.
-  std::vector<double> fold_angles() {
-    constexpr double degree = std::numbers::pi / 180.0;
-    constexpr std::size_t most = 1000;
-    const char* accepted = "1 to 1000 angles, 10 to 180 degrees each (rad, or \"60 deg\")";
-    const SceneJson* given = reader_.raw("fold_angles");
-    std::vector<double> angles{60.0 * degree, 90.0 * degree, 120.0 * degree};
-    if (given != nullptr && !given->is_array()) {
-      reader_.fail_type("fold_angles", *given, accepted);
-    } else if (given != nullptr && (given->empty() || given->size() > most)) {
-      reader_.fail("fold_angles", fmt::format("has {} angles", given->size()), accepted);
-    } else if (given != nullptr) {
-      angles.clear();
-      for (std::size_t i = 0; i < given->size(); ++i) {
-        angles.push_back(reader_.value_of((*given)[i], reader_.place_of("fold_angles", i), Dimension::angle,
-                                          Range{10.0 * degree, 180.0 * degree}));
-      }
-    }
-    reader_.write("fold_angles", angles);
-    return angles;
+    return trial_mesh_c(settings, reader_.get<std::vector<double>>("fold_angles"));
   }
 
   /// M_G: the keys of M_b, and what its geometry follows in the keys of a coat.
   MeshSource displaced() {
-    only({"columns", "rows", "mean_edge", "largest_fold", "subdivisions", "mesostructure"});
     const TrialMeshSettings settings = trial_settings();
-    const double fold = largest_fold();
-    const int subdivisions = reader_.integer("subdivisions", 4, 0, 10);
+    const double fold = number("largest_fold");
+    const int subdivisions = whole("subdivisions");
     const auto columns = static_cast<double>(settings.columns);
     const double triangles = 2.0 * columns * settings.rows * std::exp2(2.0 * subdivisions);
     if (triangles > static_cast<double>(most_displaced_triangles)) {
       reader_.fail("subdivisions", fmt::format("makes {:.0f} triangles of M_b", triangles),
                    fmt::format("at most {} triangles", most_displaced_triangles), ErrorCode::too_large);
     }
-    const SceneJson* relief = reader_.raw("mesostructure");
-    reader_.require("mesostructure", "an object with the keys of a coat");
     if (reader_.failed()) return {};
-    return reader_.value_or(displaced_by(*relief, trial_mesh_b(fold, settings), subdivisions), {});
+    return reader_.value_or(displaced_by(*reader_.raw("mesostructure"), trial_mesh_b(fold, settings), subdivisions),
+                            {});
   }
 
   Result<MeshSource> displaced_by(const SceneJson& relief, MeshSource source, int subdivisions) {
@@ -142,64 +83,38 @@ class GeneratorReader {
 
   Result<Coat> heights_of(const SceneJson& json, const TriangleMesh& base) {
     const std::string place = reader_.place_of("mesostructure");
-    for (const char* key : {"normals", "normal_map", "green", "stitching"}) {
-      if (!json.is_object() || !json.contains(key)) continue;
-      return refused(ErrorCode::bad_key, "is not read by M_G, whose geometry follows the heights",
-                     fmt::format("{}.{}", place, key), "no such key here");
-    }
-    ASPERITY_TRY(ScenePart<CoatSource> source, read_coat(json, place, base, context_));
+    ASPERITY_TRY(ScenePart<CoatSource> source, read_coat(json, place, base, context_, "mesostructure"));
     source.canonical.erase("normals");
     reader_.write("mesostructure", std::move(source.canonical));
     return at_place(Coat::build(base, std::move(source.value.parts), source.value.settings), place);
   }
 
   MeshSource cup() {
-    only({"rings", "opening", "mean_edge"});
-    const int rings = reader_.integer("rings", 8, 1, 512);
-    const double opening = reader_.quantity("opening", Dimension::angle, std::numbers::pi / 2.0, Range{0.1, 3.0});
-    const double edge = length("mean_edge", 0.01);
-    return make([&] { return trial_mesh_e(rings, opening, edge); });
+    const int rings = whole("rings");
+    const double opening = number("opening");
+    return trial_mesh_e(rings, opening, number("mean_edge"));
   }
   MeshSource strip() {
-    only({"triangles", "mean_edge", "grading"});
-    const double grading = reader_.number("grading", 0.5, Range{0.1, 0.9});
-    const int triangles = reader_.integer("triangles", 10, 1, most_graded_triangles(grading));
-    const double edge = length("mean_edge", 0.01);
-    return make([&] { return trial_mesh_f(triangles, edge, grading); });
+    const double grading = number("grading");
+    const int triangles = whole("triangles");
+    const int most = most_graded_triangles(grading);
+    if (triangles > most)
+      reader_.fail("triangles", fmt::format("is {}", triangles), fmt::format("a whole number, 1 to {}", most));
+    const double edge = number("mean_edge");
+    return reader_.failed() ? MeshSource{} : trial_mesh_f(triangles, edge, grading);
   }
   MeshSource plane() {
-    only({"width", "depth", "columns", "rows", "triangles"});
-    const double width = length("width", 0.1);
-    const double depth = length("depth", 0.1);
-    if (reader_.has("triangles")) {
-      reader_.refuse({"columns", "rows"}, "beside triangles");
-      const int triangles = reader_.integer("triangles", 2, 2, 4'194'304);
-      return make([&] { return plane_grid(width, depth, static_cast<std::uint32_t>(triangles)); });
-    }
-    const int columns = reader_.integer("columns", 1, 1, 2048);
-    const int rows = reader_.integer("rows", 1, 1, 2048);
-    return make([&] { return plane_grid(width, depth, columns, rows); });
-  }
-  MeshSource box() {
-    only({"size"});
-    const Vec3 size = reader_.lengths("size", Vec3(0.08, 0.08, 0.08));
-    if (!(size.minCoeff() >= 1e-9 && size.maxCoeff() <= 1e9))
-      reader_.fail("size", "is no box", "three lengths above 0 (m, or with a unit)");
-    return make([&] { return box_mesh(size); });
+    const double width = number("width");
+    const double depth = number("depth");
+    if (reader_.has("triangles")) return plane_grid(width, depth, static_cast<std::uint32_t>(whole("triangles")));
+    const int columns = whole("columns");
+    return plane_grid(width, depth, columns, whole("rows"));
   }
   MeshSource blob() {
-    only({"seed", "subdivisions", "radius", "roughness"});
-    const std::uint64_t seed = reader_.seed("seed", 1);
-    const int subdivisions = reader_.integer("subdivisions", 4, 0, 8);
-    const double radius = length("radius", 0.04);
-    const double roughness = reader_.number("roughness", 0.2, Range{0.0, 0.9});
-    return make([&] { return random_closed_mesh(seed, subdivisions, radius, roughness); });
-  }
-
-  /// Nothing is generated from parameters that were refused.
-  template <class Make>
-  MeshSource make(Make&& generate_mesh) {
-    return reader_.failed() ? MeshSource{} : generate_mesh();
+    const auto seed = reader_.get<std::uint64_t>("seed");
+    const int subdivisions = whole("subdivisions");
+    const double radius = number("radius");
+    return random_closed_mesh(seed, subdivisions, radius, number("roughness"));
   }
 
   ObjectReader& reader_;
@@ -208,11 +123,9 @@ class GeneratorReader {
 
 Result<MeshPart> generated(const SceneJson& json, ObjectReader& surface, SceneContext& context) {
   ObjectReader reader(json, surface.place_of("mesh"), "mesh generator");
-  reader.require("generator", "a generator's name");
-  const std::size_t generator = reader.choice("generator", generator_names(), 0);
   ASPERITY_CHECK(reader.status());
   MeshPart part;
-  part.name = generator_names()[generator];
+  part.name = reader.get<std::string>("generator");
   part.source = GeneratorReader(reader, context).generate(part.name);
   ASPERITY_CHECK(reader.status());
   surface.take("mesh", std::move(reader));
@@ -272,17 +185,14 @@ Vec3 turned_up(const Vec3& p, std::size_t axis) {
 }
 
 std::size_t read_up(ObjectReader& surface, std::size_t fallback) {
-  return surface.choice("up", axis_names(), fallback);
+  static constexpr std::array<const char*, 6> axes{"x", "y", "z", "-x", "-y", "-z"};
+  const auto up = surface.get<std::string>("up", axes[fallback]);
+  return static_cast<std::size_t>(std::find(axes.begin(), axes.end(), up) - axes.begin());
 }
 
 double read_units(ObjectReader& surface, bool from_file) {
-  static const std::vector<std::string> names{"m", "cm", "mm", "um", "in"};
-  constexpr double metres[] = {1.0, 1e-2, 1e-3, 1e-6, 0.0254};
-  if (!from_file) {
-    surface.refuse({"units"}, "for a generated mesh or volume, which is in metres");
-    return 1.0;
-  }
-  return metres[surface.choice("units", names, 0)];
+  if (!from_file) return 1.0;
+  return parse_quantity("1 " + surface.get<std::string>("units"), Dimension::length).value();
 }
 
 double read_fit(ObjectReader& surface, bool by_default, const SceneContext& context) {
@@ -296,23 +206,11 @@ double read_fit(ObjectReader& surface, bool by_default, const SceneContext& cont
     surface.write("fit", *fit);
     return *fit == "workspace" ? workspace : 0.0;
   }
-  if (!fit->is_number() && !fit->is_string()) {
-    surface.fail_type("fit", *fit, "\"workspace\", \"none\", or a length above 0");
-    return 0.0;
-  }
-  if (fit->is_string() && !parse_quantity(fit->get_ref<const std::string&>(), Dimension::length)) {
-    surface.fail("fit", fmt::format("\"{}\" is not known", fit->get_ref<const std::string&>()),
-                 "\"workspace\", \"none\", or a length above 0 (" + accepted_units(Dimension::length) + ")");
-    return 0.0;
-  }
-  return surface.quantity("fit", Dimension::length, 0.0, Range::positive());
+  return surface.get("fit", 0.0);
 }
 
 Result<MeshPart> read_mesh_part(ObjectReader& surface, SceneContext& context) {
   const SceneJson* mesh = surface.raw("mesh");
-  const char* accepted = "a mesh file (OBJ, PLY, STL, glTF) or an object with a generator";
-  surface.require("mesh", accepted);
-  if (mesh != nullptr && !mesh->is_string() && !mesh->is_object()) surface.fail_type("mesh", *mesh, accepted);
   ASPERITY_CHECK(surface.status());
   ASPERITY_TRY(MeshPart part, mesh->is_object() ? generated(*mesh, surface, context)
                                                 : from_file(mesh->get_ref<const std::string&>(), surface, context));

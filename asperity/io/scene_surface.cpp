@@ -26,17 +26,10 @@ Result<MaterialPart> read_material(ObjectReader& surface, SceneContext& context)
   const DeviceProfile& device = context.device;
   MaterialPart part;
   Material& material = part.material;
-  material.stiffness = reader.quantity("stiffness", Dimension::stiffness,
-                                       std::min(preferred_stiffness, device.max_stiffness), Range::positive());
-  material.damping = reader.quantity("damping", Dimension::damping, 0.0, Range::not_negative());
-  material.viscosity = reader.quantity("viscosity", Dimension::damping, 0.0, Range::not_negative());
-  material.magnetism = reader.quantity("magnetism", Dimension::stiffness, 0.0, Range::not_negative());
-  material.magnetic_band =
-      reader.quantity("magnetic_band", Dimension::length, material.magnetic_band, Range::positive());
-  material.stickiness = reader.quantity("stickiness", Dimension::force, 0.0, Range::not_negative());
-  material.static_friction = reader.number("static_friction", 0.0, Range::not_negative());
+  material.stiffness = std::min(preferred_stiffness, device.max_stiffness);
+  reader.read_all(material);
   // Sliding holds less than sticking: without a number of its own, four fifths of it.
-  material.dynamic_friction = reader.number("dynamic_friction", 0.8 * material.static_friction, Range::not_negative());
+  material.dynamic_friction = reader.get("dynamic_friction", 0.8 * material.static_friction);
   ASPERITY_TRY(part.fine, read_friction(reader, context, material));
   ASPERITY_CHECK(at_place(validate(material), reader.place()));
   if (material.stiffness > device.max_stiffness) {
@@ -52,8 +45,7 @@ Result<MaterialPart> read_material(ObjectReader& surface, SceneContext& context)
 Result<Surface> build_relief(MeshSurface base, CoatSource coat, ObjectReader& surface, SceneContext& context,
                              const std::string& name, const std::string& place) {
   ReliefSettings settings;
-  settings.on_overlap = surface.choice("on_overlap", settings.on_overlap);
-  settings.directions = surface.choice("shell_directions", settings.directions);
+  surface.read_all(settings);
   ASPERITY_CHECK(surface.status());
   if (context.progress) context.progress("fitting the relief", 0.0);
   ASPERITY_TRY(auto relief,
@@ -68,8 +60,7 @@ Result<Surface> build_relief(MeshSurface base, CoatSource coat, ObjectReader& su
 Result<SceneJson> close(Instance& instance, const SceneJson& json, const std::string& place, SceneContext& context) {
   ObjectReader reader(json, place, "closing");
   ClosingSettings settings;
-  settings.radius = reader.quantity("radius", Dimension::length, settings.radius, Range::positive());
-  settings.texels = reader.integer("texels", 0, 0, 512);
+  reader.read_all(settings);
   ASPERITY_CHECK(reader.status());
   const auto before = *std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   const ReliefSurface& relief = *before;
@@ -97,11 +88,7 @@ Result<ScenePart<CoatSource>> read_gltf_coat(const SceneJson* json, const std::s
                                              SceneContext& context) {
   static const SceneJson by_default = SceneJson{{"from", "gltf"}};
   ObjectReader reader(json != nullptr ? *json : by_default, place, "coat");
-  static const std::vector<std::string> sources{"gltf"};
-  reader.choice("from", sources, 0);
-  reader.refuse({"height_map", "channel", "height", "height_range", "offset", "white_is", "magnify", "tile", "repeat",
-                 "mapping", "wrap", "filter", "normal_map", "green", "normals", "detail", "layers", "maps"},
-                "beside \"from\": \"gltf\"");
+  reader.write("from", "gltf");
   Stitching stitching;
   if (const SceneJson* given = reader.raw("stitching")) {
     ASPERITY_TRY(stitching, read_stitching(*given, reader.place_of("stitching"), context, reader));
@@ -114,17 +101,14 @@ Result<ScenePart<CoatSource>> read_gltf_coat(const SceneJson* json, const std::s
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
 Status read_triangles(ObjectReader& reader, const Law& law, const Material& own, SceneContext& context,
                       Instance& instance, TexturePart& texture) {
-  reader.refuse({"iso"}, "without a volume");
-  ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(MeshPart part, read_mesh_part(reader, context));
-  instance.name = reader.text("name", part.name);
-  const auto search = reader.choice("search", SearchStructure::bvh);
-  ASPERITY_CHECK(reader.status());
+  instance.name = reader.get("name", part.name);
+  const auto search = reader.get<SearchStructure>("search");
   if (context.progress) context.progress("building the search structure", 0.0);
   const SceneJson* coat_json = reader.raw("coat");
   const std::filesystem::path file =
       part.from_file ? context.resolve(reader.raw("mesh")->get<std::string>()) : std::filesystem::path();
-  const bool says = coat_json != nullptr && coat_json->is_object() && coat_json->contains("from");
+  const bool says = coat_json != nullptr && coat_json->contains("from");
   if (says && !is_gltf_path(file)) {
     reader.fail("coat.from", "is \"gltf\", and the mesh is no glTF file", "a mesh that is one, or height_map");
     return reader.status();
@@ -143,7 +127,7 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
     baked = std::move(features.maps);
   }
   MeshSurface base(TriangleIndex::build(std::move(mesh), search));
-  instance.sides = reader.choice_or_auto<Sides>("sides");
+  instance.sides = reader.get<std::optional<Sides>>("sides");
   if (!instance.sides && base.natural_sides() == Sides::both) {
     context.note(
         fmt::format("mesh \"{}\" is not closed and consistently oriented: it is touched from both sides (\"sides\" "
@@ -188,12 +172,9 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
 
 /// What can be touched, of a volume: an isosurface, from either side unless the scene says otherwise.
 Status read_isosurface(ObjectReader& reader, SceneContext& context, Instance& instance) {
-  reader.refuse({"mesh", "up", "search", "coat", "on_overlap", "shell_directions"}, "beside a volume");
-  ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(const VolumePart volume, read_volume_part(reader, context));
-  instance.name = reader.text("name", volume.name);
-  instance.sides = reader.choice_or_auto<Sides>("sides");
-  ASPERITY_CHECK(reader.status());
+  instance.name = reader.get("name", volume.name);
+  instance.sides = reader.get<std::optional<Sides>>("sides");
   ASPERITY_TRY(std::shared_ptr<const IsoSurface> surface, read_iso(reader, volume, context));
   instance.surface = std::move(surface);
   return success();
@@ -219,23 +200,16 @@ Result<TriangleMesh> build_mesh(MeshPart part, const ObjectReader& surface, Scen
 Result<Pose> read_pose(ObjectReader& surface) {
   ObjectReader reader(surface.raw("pose"), surface.place_of("pose"), "pose");
   Pose pose;
-  pose.position = reader.lengths("position", Vec3::Zero());
-  if (const SceneJson* q = reader.raw("orientation")) {
-    reader.refuse({"axis", "angle"}, "beside orientation");
-    if (!are_numbers(*q, 4)) {
-      reader.fail_type("orientation", *q, "a quaternion [w, x, y, z]");
-    } else {
-      pose.orientation =
-          Quat((*q)[0].get<double>(), (*q)[1].get<double>(), (*q)[2].get<double>(), (*q)[3].get<double>());
-      const double norm = pose.orientation.norm();
-      if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
-      // Written and read again, an orientation keeps its bits.
-      if (std::abs(norm - 1.0) > 1e-12) pose.orientation.normalize();
-    }
-  } else if (reader.has("angle") || reader.has("axis")) {
-    const Vec3 axis = reader.direction("axis", Vec3::UnitY());
-    const double angle = reader.quantity("angle", Dimension::angle, 0.0);
-    if (!reader.failed()) pose.orientation = Quat(Eigen::AngleAxisd(angle, axis.normalized()));
+  pose.position = reader.get<Vec3>("position");
+  if (reader.has("orientation")) {
+    const auto q = reader.get<std::vector<double>>("orientation");
+    pose.orientation = Quat(q[0], q[1], q[2], q[3]);
+    const double norm = pose.orientation.norm();
+    if (!(norm > 1e-6 && norm < 1e6)) reader.fail("orientation", "is no rotation", "a quaternion [w, x, y, z]");
+    // Written and read again, an orientation keeps its bits.
+    if (std::abs(norm - 1.0) > 1e-12) pose.orientation.normalize();
+  } else {
+    pose.orientation = read_turn(reader);
   }
   ASPERITY_CHECK(reader.status());
   const Quat& q = pose.orientation;

@@ -23,109 +23,32 @@ struct VolumeWords {
   CellReconstruction reconstruction = CellReconstruction::smooth;
 };
 
-template <class T>
-std::optional<T> named(ObjectReader& reader, std::string_view key, Result<T> (*parse)(std::string_view)) {
-  const SceneJson* value = reader.raw(key);
-  if (value == nullptr) return std::nullopt;
-  if (!value->is_string()) {
-    reader.fail_type(key, *value, parse("?").error().accepted);
-    return std::nullopt;
-  }
-  const Result<T> parsed = parse(value->get_ref<const std::string&>());
-  reader.write(key, *value);
-  if (parsed) return *parsed;
-  reader.fail(key, parsed.error().what, parsed.error().accepted);
-  return std::nullopt;
-}
-
 VolumeWords read_words(ObjectReader& reader) {
   VolumeWords words;
-  words.derive = named<DerivedField>(reader, "derive", parse_derived_field);
-  const SceneJson* component = reader.raw("component");
-  if (component != nullptr && component->is_number()) {
-    words.component = reader.integer("component", 0, 0, 1000);
+  words.derive = reader.find<DerivedField>("derive");
+  if (const SceneJson* component = reader.raw("component"); component != nullptr && component->is_number()) {
+    words.component = reader.get("component", 0);
   } else {
-    words.part = named<VectorPart>(reader, "component", parse_vector_part);
+    words.part = reader.find<VectorPart>("component");
   }
-  if (words.derive && component != nullptr) reader.refuse({"component"}, "beside \"derive\"");
-  words.reconstruction = reader.choice("reconstruction", words.reconstruction);
+  words.reconstruction = reader.get<CellReconstruction>("reconstruction");
   return words;
 }
 
-std::array<std::uint32_t, 3> three_counts(ObjectReader& reader, std::string_view key, std::uint32_t least) {
+std::array<std::uint32_t, 3> three_counts(ObjectReader& reader, std::string_view key) {
   std::array<std::uint32_t, 3> counts{};
   const SceneJson* value = reader.raw(key);
   if (value == nullptr) return counts;
-  const std::string accepted = fmt::format("three whole numbers, {} to 4096", least);
-  if (!value->is_array() || value->size() != 3) {
-    reader.fail_type(key, *value, accepted);
-    return counts;
-  }
-  for (std::size_t a = 0; a < 3; ++a) {
-    const SceneJson& n = (*value)[a];
-    if (!n.is_number_unsigned() || n.get<std::uint64_t>() < least || n.get<std::uint64_t>() > 4096) {
-      reader.fail(fmt::format("{}[{}]", key, a), fmt::format("is {}", n.dump()), accepted);
-      return counts;
-    }
-    counts[a] = n.get<std::uint32_t>();
-  }
+  for (std::size_t a = 0; a < 3; ++a) counts[a] = static_cast<std::uint32_t>((*value)[a].get<double>());
   reader.write(key, *value);
   return counts;
 }
 
-/// The parameters of a generator, by the names that its kind takes.
-class GeneratorWords {
- public:
-  GeneratorWords(ObjectReader& reader, VolumeGenerator& generator) : reader_(reader), generator_(generator) {}
-
-  void read() {
-    refuse_others();
-    if (reader_.has("size")) generator_.size = three_counts(reader_, "size", 2);
-    if (reader_.has("extent")) generator_.extent = reader_.lengths("extent", Vec3::Zero());
-    if (reader_.has("stretch")) generator_.stretch = reader_.number("stretch", 1.0, Range{1.0, 100.0});
-    length("radius", generator_.radius);
-    length("wavelength", generator_.wavelength);
-    length("thickness", generator_.thickness);
-    if (reader_.has("amplitude")) generator_.amplitude = amplitude();
-    if (reader_.has("gradient")) generator_.gradient = reader_.number("gradient", generator_.gradient);
-    if (reader_.has("count")) generator_.count = reader_.integer("count", generator_.count, 1, 64);
-    if (reader_.has("speed"))
-      generator_.speed = reader_.quantity("speed", Dimension::speed, generator_.speed, Range::positive());
-    if (reader_.has("strength")) generator_.strength = reader_.number("strength", generator_.strength, Range{0.0, 0.9});
-    if (reader_.has("time")) generator_.time = reader_.quantity("time", Dimension::time, generator_.time);
-    if (reader_.has("type")) generator_.type = reader_.choice("type", SampleType::float32);
-  }
-
- private:
-  void refuse_others() {
-    const std::span<const std::string_view> own = parameters_of(generator_.kind);
-    for (const std::string_view key :
-         {"radius", "wavelength", "thickness", "amplitude", "gradient", "count", "speed", "strength", "time"}) {
-      if (std::find(own.begin(), own.end(), key) == own.end())
-        reader_.refuse({key}, fmt::format("by the generator \"{}\"", to_string(generator_.kind)));
-    }
-  }
-  void length(std::string_view key, std::optional<double>& value) {
-    if (reader_.has(key)) value = reader_.quantity(key, Dimension::length, 0.0, Range::positive());
-  }
-  /// A length for waves, in the field's unit for a ramp.
-  double amplitude() {
-    if (generator_.kind == VolumeKind::waves)
-      return reader_.quantity("amplitude", Dimension::length, 0.0, Range::not_negative());
-    return reader_.number("amplitude", 0.0, Range::not_negative());
-  }
-
-  ObjectReader& reader_;
-  VolumeGenerator& generator_;
-};
-
 Result<Samples> generate(ObjectReader& reader, SceneContext& context, std::string& name) {
-  reader.refuse({"file", "array", "association", "resample", "residency"}, "beside a generator");
-  const std::optional<VolumeKind> kind = named<VolumeKind>(reader, "generator", parse_volume_kind);
-  ASPERITY_CHECK(reader.status());
   VolumeGenerator generator;
-  generator.kind = *kind;
-  GeneratorWords(reader, generator).read();
+  generator.kind = *reader.find<VolumeKind>("generator");
+  if (reader.has("size")) generator.size = three_counts(reader, "size");
+  reader.read_all(generator, true);
   ASPERITY_CHECK(reader.status());
   name = to_string(generator.kind);
   return at_place(generate_volume(generator, context.progress), reader.place());
@@ -134,13 +57,12 @@ Result<Samples> generate(ObjectReader& reader, SceneContext& context, std::strin
 Result<Samples> read_file(ObjectReader& reader, const VolumeWords& words, SceneContext& context,
                           const std::filesystem::path& path) {
   VolumeRequest request;
-  request.array = reader.text("array", "");
-  request.association = reader.choice("association", Association::any);
+  request.array = reader.get("array", std::string());
+  request.association = reader.get("association", Association::any);
   request.component = words.component;
   request.vectors = words.part.has_value() || (words.derive && *words.derive != DerivedField::gradient_magnitude);
-  request.resample = three_counts(reader, "resample", 0);
+  request.resample = three_counts(reader, "resample");
   if (const SceneJson* time = reader.raw("time")) {
-    if (!time->is_string() && !time->is_number()) reader.fail_type("time", *time, "the name of a time step");
     request.time = time->is_string() ? time->get<std::string>() : time->dump();
     reader.write("time", request.time);
   }
@@ -234,13 +156,11 @@ Result<VolumePart> in_memory(ObjectReader& object, ObjectReader& reader, const V
 
 Result<VolumePart> read_part(ObjectReader& object, const SceneJson& json, SceneContext& context) {
   ObjectReader reader(json, object.place_of("volume"), "volume");
+  ASPERITY_CHECK(reader.status());
   const VolumeWords words = read_words(reader);
   std::filesystem::path path;
   if (!reader.has("generator")) {
-    reader.refuse({"size", "extent", "stretch", "radius", "wavelength", "thickness", "amplitude", "gradient", "count",
-                   "speed", "strength", "type"},
-                  "without a generator");
-    path = context.resolve(reader.required_text("file", "a volume file, or a generator"));
+    path = context.resolve(reader.get("file", std::string()));
     reader.write("file", path.string());
   }
   ASPERITY_CHECK(reader.status());
@@ -253,21 +173,9 @@ Result<VolumePart> read_part(ObjectReader& object, const SceneJson& json, SceneC
 
 /// A number, or a share of the field's range.
 std::optional<double> read_threshold(ObjectReader& reader, const ScalarField& field) {
-  const SceneJson* value = reader.raw("threshold");
-  const char* accepted = "a number in the field's unit, or a share of its range (\"50 %\")";
-  if (value == nullptr) return std::nullopt;
-  if (value->is_number()) return reader.number("threshold", 0.0);
-  if (!value->is_string()) {
-    reader.fail_type("threshold", *value, accepted);
-    return std::nullopt;
-  }
-  const auto& text = value->get_ref<const std::string&>();
-  const Result<double> share = parse_quantity(text, Dimension::ratio);
-  if (!share || text.find('%') == std::string::npos || *share < 0.0 || *share > 1.0) {
-    reader.fail("threshold", fmt::format("\"{}\" is no share of a range", text), accepted);
-    return std::nullopt;
-  }
-  return field.lowest() + *share * (field.highest() - field.lowest());
+  const std::optional<double> given = reader.find<double>("threshold");
+  if (!given || !reader.raw("threshold")->is_string()) return given;
+  return field.lowest() + *given * (field.highest() - field.lowest());
 }
 
 double chosen_threshold(const VolumePart& volume, SceneContext& context) {
@@ -284,41 +192,13 @@ double chosen_threshold(const VolumePart& volume, SceneContext& context) {
 }  // namespace
 
 std::size_t read_bytes(ObjectReader& reader, std::string_view key, std::size_t fallback) {
-  constexpr double least = 1048576.0;
-  constexpr double most = 1099511627776.0;
-  const char* accepted = "bytes, or a text with kB, MB, GB, KiB, MiB or GiB; 1 MiB to 1 TiB";
-  const SceneJson* value = reader.raw(key);
-  double bytes = static_cast<double>(fallback);
-  if (value != nullptr && value->is_number()) {
-    bytes = value->get<double>();
-  } else if (value != nullptr && value->is_string()) {
-    const auto& text = value->get_ref<const std::string&>();
-    const std::size_t end = text.find_first_not_of("0123456789. ");
-    Result<double> number = parse_quantity(text.substr(0, end), Dimension::ratio);
-    const std::string unit = end == std::string::npos ? "" : text.substr(end);
-    static const std::vector<std::pair<std::string, double>> units{
-        {"B", 1.0}, {"kB", 1e3}, {"MB", 1e6}, {"GB", 1e9}, {"KiB", 1024.0}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}};
-    const auto found = std::find_if(units.begin(), units.end(), [&](const auto& entry) { return entry.first == unit; });
-    if (!number || found == units.end()) {
-      reader.fail(key, fmt::format("\"{}\" is no size", text), accepted);
-    } else {
-      bytes = *number * found->second;
-    }
-  } else if (value != nullptr) {
-    reader.fail_type(key, *value, accepted);
-  }
-  if (!(bytes >= least && bytes <= most)) reader.fail(key, fmt::format("is {:g} bytes", bytes), accepted);
-  if (reader.failed()) return fallback;
-  const auto resident = static_cast<std::size_t>(bytes);
-  reader.write(key, resident);
-  return resident;
+  const auto bytes = static_cast<std::size_t>(reader.get(key, static_cast<double>(fallback)));
+  reader.write(key, bytes);
+  return bytes;
 }
 
 Result<VolumePart> read_volume_part(ObjectReader& object, SceneContext& context) {
   const SceneJson* volume = object.raw("volume");
-  const char* accepted = "a volume file or an object with \"file\" or \"generator\"";
-  object.require("volume", accepted);
-  if (volume != nullptr && !volume->is_string() && !volume->is_object()) object.fail_type("volume", *volume, accepted);
   ASPERITY_CHECK(object.status());
   std::string key;
   for (const char* part : {"volume", "units", "fit"}) key += object.has(part) ? object.raw(part)->dump() + "\n" : "\n";
@@ -342,8 +222,8 @@ Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const 
   ObjectReader reader(surface.raw("iso"), surface.place_of("iso"), "iso");
   reader.write("threshold", nullptr);  // first in its canonical copy, however it is found
   const std::optional<double> given = read_threshold(reader, *volume.field);
-  const auto inside = reader.choice("inside", Inside::high);
-  const double speed = reader.quantity("threshold_speed", Dimension::speed, 0.02, Range::positive());
+  const auto inside = reader.get<Inside>("inside");
+  const double speed = reader.get<double>("threshold_speed");
   ASPERITY_CHECK(reader.status());
   const double threshold = given ? *given : chosen_threshold(volume, context);
   reader.write("threshold", threshold);

@@ -21,10 +21,6 @@ namespace fs = std::filesystem;
 using volume_assembly::RawVolume;
 
 constexpr std::array<const char*, 3> sidecar_axis_names{"x", "y", "z"};
-constexpr std::uint64_t most_nodes = 1U << 20U;  // along an axis: 1e6 nodes of 8 bytes, before any sample is looked at
-
-const std::vector<std::string> sidecar_keys{"asperity_volume", "file", "size",       "type",  "byte_order",  "origin",
-                                            "spacing",         "axes", "components", "array", "association", "unit"};
 
 /// What a sidecar says.
 struct Sidecar {
@@ -36,115 +32,48 @@ struct Sidecar {
   std::size_t samples = 0;  ///< tuples
 };
 
-void read_size(ObjectReader& reader, Sidecar& sidecar) {
-  const char* accepted = "three whole numbers of samples, 1 or more, along x, y, z";
-  const SceneJson* size = reader.raw("size");
-  if (size == nullptr) return reader.require("size", accepted);
-  if (!size->is_array()) return reader.fail_type("size", *size, accepted);
-  if (size->size() != 3) return reader.fail("size", fmt::format("has {} numbers", size->size()), accepted);
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::string place = reader.place_of("size", a);
-    const SceneJson& n = (*size)[a];
-    if (!n.is_number()) {
-      return reader.fail(
-          refused(ErrorCode::bad_type, fmt::format("is {}", json_type(n)), place, "a whole number of samples"));
-    }
-    if (!n.is_number_unsigned() || n.get<std::uint64_t>() == 0 || n.get<std::uint64_t>() > most_nodes) {
-      return reader.fail(
-          bad_value(fmt::format("is {}", n.dump()), place, fmt::format("a whole number, 1 to {}", most_nodes)));
-    }
-    sidecar.size[a] = n.get<std::uint64_t>();
-  }
-}
-
-/// Three numbers at `key`; `above_zero` for spacings.
-Vec3 three_numbers(ObjectReader& reader, const char* key, const Vec3& fallback, bool above_zero) {
-  const char* accepted = above_zero ? "three numbers above 0" : "three numbers";
-  const SceneJson* value = reader.raw(key);
-  if (value == nullptr) return fallback;
-  if (!value->is_array()) {
-    reader.fail_type(key, *value, accepted);
-  } else if (value->size() != 3) {
-    reader.fail(key, fmt::format("has {} numbers", value->size()), accepted);
-  }
-  Vec3 numbers = fallback;
-  for (std::size_t a = 0; a < 3 && !reader.failed(); ++a) {
-    const SceneJson& number = (*value)[a];
-    const std::string place = reader.place_of(key, a);
-    const double read = number.is_number() ? number.get<double>() : 0.0;
-    if (!number.is_number()) {
-      reader.fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(number)), place, accepted));
-    } else if (!std::isfinite(read) || (above_zero && !(read > 0.0))) {
-      reader.fail(bad_value(fmt::format("is {:g} (axis {})", read, sidecar_axis_names[a]), place, accepted));
-    }
-    numbers[static_cast<int>(a)] = read;
-  }
-  return numbers;
-}
-
-void read_axis(ObjectReader& reader, const SceneJson& json, std::size_t count, const std::string& place,
-               std::vector<double>& nodes) {
-  const auto bad = [&](ErrorCode code, std::string what, const std::string& where) {
-    reader.fail(refused(code, std::move(what), where, fmt::format("an array of {} coordinates", count)));
-  };
-  if (!json.is_array()) return bad(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place);
-  if (json.size() != count) return bad(ErrorCode::bad_value, fmt::format("has {} coordinates", json.size()), place);
-  nodes.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!json[i].is_number())
-      return bad(ErrorCode::bad_type, fmt::format("is {}", json_type(json[i])), fmt::format("{}[{}]", place, i));
-    nodes.push_back(json[i].get<double>());
-  }
+void read_axis(ObjectReader& reader, const char* key, std::size_t count, std::vector<double>& nodes) {
+  nodes = reader.get(key, std::vector<double>());
+  if (nodes.size() != count)
+    reader.fail(key, fmt::format("has {} coordinates", nodes.size()), fmt::format("an array of {} coordinates", count));
 }
 
 void read_places(ObjectReader& reader, Sidecar& sidecar) {
   const std::size_t more = sidecar.raw.cell_data ? 1 : 0;
-  const SceneJson* axes = reader.raw("axes");
-  if (axes == nullptr) {
-    const Vec3 spacing = three_numbers(reader, "spacing", Vec3::Ones(), true);
-    const Vec3 origin = three_numbers(reader, "origin", Vec3::Zero(), false);
-    for (std::size_t a = 0; a < 3 && !reader.failed(); ++a) {
-      const auto along = static_cast<int>(a);
-      sidecar.raw.nodes[a] = volume_assembly::even_nodes(origin[along], spacing[along], sidecar.size[a] + more);
-    }
-    return;
+  if (const SceneJson* axes = reader.raw("axes")) {
+    ObjectReader axes_reader(*axes, reader.place_of("axes"), "sidecar's axes");
+    for (std::size_t a = 0; a < 3; ++a)
+      read_axis(axes_reader, sidecar_axis_names[a], sidecar.size[a] + more, sidecar.raw.nodes[a]);
+    return reader.take("axes", std::move(axes_reader));
   }
-  reader.refuse({"spacing", "origin"}, "beside \"axes\"");
-  if (reader.failed()) return;
-  static const std::vector<std::string> keys{"x", "y", "z"};
-  ObjectReader axes_reader(*axes, reader.place_of("axes"), "sidecar's axes", keys);
-  for (std::size_t a = 0; a < 3 && !axes_reader.failed(); ++a) {
-    const char* name = sidecar_axis_names[a];
-    axes_reader.require(name, "an array of coordinates");
-    if (const SceneJson* axis = axes_reader.raw(name))
-      read_axis(axes_reader, *axis, sidecar.size[a] + more, axes_reader.place_of(name), sidecar.raw.nodes[a]);
+  const auto spacing = reader.get<Vec3>("spacing");
+  const auto origin = reader.get<Vec3>("origin");
+  for (std::size_t a = 0; a < 3 && !reader.failed(); ++a) {
+    const auto along = static_cast<int>(a);
+    sidecar.raw.nodes[a] = volume_assembly::even_nodes(origin[along], spacing[along], sidecar.size[a] + more);
   }
-  reader.take("axes", std::move(axes_reader));
 }
 
 /// Everything but the samples, checked against `most_bytes` before anything of their size is made.
 Result<Sidecar> read_description(std::string_view text, const std::string& name, const VolumeRequest& request) {
-  static const std::vector<std::string> orders{"little", "big"};
-  static const std::vector<std::string> associations{to_string(Association::node), to_string(Association::cell)};
   ASPERITY_TRY(const SceneJson json, parse_scene_json(text, name));
-  ObjectReader reader(json, "", "volume's sidecar", sidecar_keys);
-  reader.require("asperity_volume", "1, the version of the sidecar's format");
-  const int version = reader.integer("asperity_volume", 1, 1, 1000000);
-  if (version != 1) {
+  ObjectReader reader(json, "", "volume's sidecar");
+  if (const int version = reader.get("asperity_volume", 1); version != 1) {
     reader.fail("asperity_volume", fmt::format("is {}, a newer format than this program reads", version), "1",
                 ErrorCode::file_unsupported);
   }
+  ASPERITY_CHECK(reader.status());
   Sidecar sidecar;
-  sidecar.file = reader.required_text("file", "the file of raw samples");
-  if (!reader.failed()) read_size(reader, sidecar);
-  for (const char* key : {"type", "byte_order"}) reader.require(key, "the samples' type and byte order");
-  sidecar.type = reader.choice("type", SampleType::float32);
-  sidecar.big_endian = reader.choice("byte_order", orders, 0) == 1;
-  sidecar.raw.components = reader.integer("components", 1, 1, 3);
+  sidecar.file = reader.get("file", std::string());
+  for (std::size_t a = 0; a < 3; ++a)
+    sidecar.size[a] = static_cast<std::uint64_t>((*reader.raw("size"))[a].get<double>());
+  sidecar.type = reader.get("type", SampleType::float32);
+  sidecar.big_endian = reader.get("byte_order", std::string()) == "big";
+  sidecar.raw.components = reader.get<int>("components");
   if (sidecar.raw.components == 2) reader.fail("components", "is 2", "1 or 3");
-  sidecar.raw.cell_data = reader.choice("association", associations, 0) == 1;
-  sidecar.raw.array = reader.text("array", fs::path(sidecar.file).stem().string());
-  sidecar.raw.unit = reader.text("unit", "");
+  sidecar.raw.cell_data = reader.get<std::string>("association") == "cell";
+  sidecar.raw.array = reader.get("array", fs::path(sidecar.file).stem().string());
+  sidecar.raw.unit = reader.get("unit", std::string());
   ASPERITY_CHECK(reader.status());
   const std::size_t bytes_each = sample_bytes(sidecar.type) * static_cast<std::size_t>(sidecar.raw.components);
   ASPERITY_TRY(sidecar.samples,

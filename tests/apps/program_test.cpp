@@ -319,6 +319,11 @@ TEST_F(Program, ScenesAndSchemaPrint) {
   write("printed.json", run("scenes icosphere").out);
   EXPECT_EQ(run("inspect printed.json").code, 0);
   EXPECT_EQ(run("schema").out, scene_schema_json());
+  EXPECT_EQ(run("schema --page").out, scene_page());
+  EXPECT_TRUE(has(run("schema stroke.speed").out, "m/s"));
+  EXPECT_TRUE(has(run("schema surfaces.coat.height").out, "share of the mean edge"));
+  EXPECT_TRUE(has(run("schema coat").out, "keys: from, height_map"));
+  refused("schema stroke.spede", {"did you mean \"stroke.speed\"?"});
   refused("scenes icospher", {"did you mean \"icosphere\""});
 }
 

@@ -125,7 +125,7 @@ TEST_F(ExperimentErrors, Surfaces) {
   surface(R"("law":{"type":"mesostructure-literal","rho":0.5})", ErrorCode::bad_value, "surfaces[0].law.rho", "0.3333");
   surface(R"("law":{"type":"mesostructure-literal","blend":"cubic"})", ErrorCode::bad_value, "surfaces[0].law.blend",
           "s_shape");
-  surface(R"("law":{"type":"mesostructure-literal","blend":[0.5]})", ErrorCode::bad_value, "surfaces[0].law.blend_map",
+  surface(R"("law":{"type":"mesostructure-literal","blend":[0.5]})", ErrorCode::bad_value, "surfaces[0].law.blend",
           "two");
 }
 
@@ -154,7 +154,7 @@ TEST_F(ExperimentErrors, Coats) {
   coat(R"("height_map":"map.png","channel":"red")", ErrorCode::bad_map, ".channel", "map.png");
   coat(R"("height_map":"map.png","height":-1)", ErrorCode::bad_value, ".height", "0 or more");
   coat(R"("height_map":"map.png","height":"2 N")", ErrorCode::bad_value, ".height", "unknown unit");
-  coat(R"("height_map":"map.png","height":"x%")", ErrorCode::bad_value, ".height", "no share of the mean edge");
+  coat(R"("height_map":"map.png","height":"x%")", ErrorCode::bad_value, ".height", "share of the mean edge");
   coat(R"("height_map":"map.png","height":"1m")", ErrorCode::bad_value, ".height", "half the diagonal");
   coat(R"("height_map":"map.png","height_range":[0,1])", ErrorCode::bad_value, ".height_range", "half the diagonal");
   coat(R"("height_map":"map.png","height_range":[1,0])", ErrorCode::bad_value, ".height_range", "higher end first");

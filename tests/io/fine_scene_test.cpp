@@ -538,7 +538,7 @@ TEST_F(FineScene, FrictionRefusesWhatIsWrong) {
   const auto friction = [&](const std::string& members, const std::string& key, const std::string& part = {}) {
     refused(material(members), "material." + key, part);
   };
-  friction(R"("friction":"karnop")", "friction.law", "did you mean \"karnopp\"");
+  friction(R"("friction":"karnop")", "friction", "did you mean \"karnopp\"");
   friction(R"("friction":3)", "friction", "is a number");
   friction(R"("friction":{})", "friction.law", "is missing");
   friction(R"("friction":{"law":"dahl","stick_speed":0.1})", "friction.stick_speed", "by the friction law \"dahl\"");

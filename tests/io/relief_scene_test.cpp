@@ -193,7 +193,7 @@ TEST_F(ReliefScene, WrongLayersAndMapsAreRefusedByName) {
           "surfaces[0].coat.layers[0].amplitude");
   refused(scene(ramp_coat(R"("layers":[{"height_map":"map.png","repeat":2}])")), "surfaces[0].coat.layers[0].repeat");
   refused(scene(ramp_coat(R"("layers":{})")), "surfaces[0].coat.layers");
-  refused(scene(ramp_coat(R"("detail":"mip")")), "surfaces[0].coat.detail.kind");
+  refused(scene(ramp_coat(R"("detail":"mip")")), "surfaces[0].coat.detail");
   refused(scene(ramp_coat(R"("maps":{"stiffness":{"image":"map.png","high":1}})")),
           "surfaces[0].coat.maps.stiffness.low");
   refused(scene(ramp_coat(R"("maps":{"stiffness":{"image":"map.png","low":0,"high":1}})")),

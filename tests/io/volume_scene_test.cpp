@@ -279,7 +279,7 @@ TEST_F(VolumeScene, EffectsThatAreWrongAreRefused) {
   EXPECT_EQ(place(R"("type":"viscosity","transfer":[])"), "effects[0].transfer");
   EXPECT_EQ(place(R"("type":"viscosity","transfer":[[0,1],[0,2]])"), "effects[0].transfer[1]");
   EXPECT_EQ(place(R"("type":"viscosity","transfer":[[0]])"), "effects[0].transfer[0]");
-  EXPECT_EQ(place(R"("type":"viscosity","transfer":[["a",1]])"), "effects[0].transfer[0]");
+  EXPECT_EQ(place(R"("type":"viscosity","transfer":[["a",1]])"), "effects[0].transfer[0][0]");
   EXPECT_EQ(place(R"("type":"viscosity","transfer":[[0,1]],"direction":[1,0,0])"), "effects[0].direction");
   EXPECT_EQ(place(R"("type":"iwata","transfer":[[0,1]],"direction":[0,0,0])"), "effects[0].direction");
   EXPECT_EQ(place(R"("type":"iwata","transfer":[[0,1]],"value":1)"), "effects[0].value");

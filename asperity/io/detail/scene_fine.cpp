@@ -38,9 +38,15 @@ class MappingReader {
 
   Result<ScenePart<FeatureMapping>> read() {
     const bool parametric = host_.parametric != nullptr;
-    settings_.surface = reader_.choice("surface", parametric ? IntermediateSurface::uv : IntermediateSurface::plane);
+    settings_.surface = reader_.get("surface", parametric ? IntermediateSurface::uv : IntermediateSurface::plane);
     ASPERITY_CHECK(reader_.status());
-    refuse_others();
+    // Which mapping it is that nobody names depends on the surface.
+    if (!reader_.has("surface")) {
+      const std::string by = fmt::format("by the mapping \"{}\"", to_string(settings_.surface));
+      if (parametric) reader_.refuse({"origin", "axis", "reference"}, by);
+      if (!parametric) reader_.refuse({"tile"}, by);
+      reader_.refuse({"radius", "half_extent"}, by);
+    }
     if (settings_.surface == IntermediateSurface::uv) {
       read_tile();
     } else {
@@ -52,17 +58,6 @@ class MappingReader {
   }
 
  private:
-  void refuse_others() {
-    const auto only_for = [&](bool mine, std::initializer_list<std::string_view> keys) {
-      if (!mine) reader_.refuse(keys, fmt::format("by the mapping \"{}\"", to_string(settings_.surface)));
-    };
-    const IntermediateSurface surface = settings_.surface;
-    only_for(surface != IntermediateSurface::uv, {"origin", "axis", "reference"});
-    only_for(surface == IntermediateSurface::cylinder || surface == IntermediateSurface::sphere, {"radius"});
-    only_for(surface == IntermediateSurface::box, {"half_extent"});
-    only_for(surface == IntermediateSurface::uv, {"tile"});
-  }
-
   void read_tile() {
     Vec2 unit = Vec2::Ones();
     if (host_.parametric != nullptr) {
@@ -73,15 +68,15 @@ class MappingReader {
       reader_.fail("surface", "is \"uv\", and the surface has no texture coordinates",
                    "\"plane\", \"cylinder\", \"sphere\" or \"box\"", ErrorCode::mismatch);
     }
-    settings_.tile = reader_.pair("tile", Dimension::length, unit, Range::positive());
+    settings_.tile = reader_.get("tile", unit);
   }
 
   void read_frame() {
-    settings_.origin = reader_.lengths("origin", host_.bounds.centre());
-    settings_.axis = reader_.direction("axis", own_axis()).normalized();
+    settings_.origin = reader_.get<Vec3>("origin", host_.bounds.centre());
+    settings_.axis = reader_.get("axis", own_axis()).normalized();
     // Along the coordinate axis that is farthest from the mapping's own.
     const Vec3 along = std::abs(settings_.axis.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
-    const Vec3 wanted = reader_.direction("reference", along).normalized();
+    const Vec3 wanted = reader_.get("reference", along).normalized();
     const Vec3 across = wanted - wanted.dot(settings_.axis) * settings_.axis;
     if (across.norm() < 1e-3) {
       reader_.fail("reference", "runs along the axis", "a direction at an angle to \"axis\"");
@@ -91,10 +86,9 @@ class MappingReader {
     const Vec3 extent = extent_along();
     const Vec3 half = 0.5 * extent;
     if (settings_.surface == IntermediateSurface::cylinder)
-      settings_.radius = reader_.quantity("radius", Dimension::length, std::max(half.x(), half.y()), Range::positive());
-    if (settings_.surface == IntermediateSurface::sphere)
-      settings_.radius = reader_.quantity("radius", Dimension::length, half.maxCoeff(), Range::positive());
-    if (settings_.surface == IntermediateSurface::box) settings_.half_extent = reader_.lengths("half_extent", half);
+      settings_.radius = reader_.get("radius", std::max(half.x(), half.y()));
+    if (settings_.surface == IntermediateSurface::sphere) settings_.radius = reader_.get("radius", half.maxCoeff());
+    if (settings_.surface == IntermediateSurface::box) settings_.half_extent = reader_.get("half_extent", half);
   }
 
   /// The middle of a sheet is looked at from above, and so is a vase.
@@ -130,24 +124,22 @@ class FeatureReader {
       : reader_(json, place, "feature"), around_(around), context_(context) {}
 
   Result<SurfaceFeature> read() {
-    reader_.require("type", "a feature's name");
-    spec_.kind = reader_.choice("type", FeatureKind::grating);
     ASPERITY_CHECK(reader_.status());
-    refuse_others();
-    if (takes("direction")) spec_.direction = reader_.quantity("direction", Dimension::angle, 0.0);
-    if (takes("heights")) ASPERITY_CHECK(read_heights());
-    if (takes("amplitude")) spec_.amplitude = required("amplitude");
-    if (takes("wavelength")) read_wavelength();
-    if (takes("phase")) spec_.phase = reader_.quantity("phase", Dimension::angle, 0.0);
-    if (takes("centre")) spec_.centre = reader_.pair("centre", Dimension::length, spec_.centre);
-    if (takes("wall")) spec_.wall = reader_.quantity("wall", Dimension::ratio, spec_.wall, Range{0.01, 0.5});
-    if (takes("roughness")) read_roughness();
-    if (takes("correlation_length")) spec_.correlation_length = required("correlation_length");
-    if (takes("seed")) spec_.seed = reader_.seed("seed", spec_.seed);
-    if (takes("period")) {
-      // What goes around comes back where it started.
-      spec_.period = reader_.pair("period", Dimension::length, Vec2(around_, 0.0), Range::not_negative());
-    }
+    reader_.read("type", spec_.kind);
+    if (around_ <= 0.0) reader_.refuse({"count"}, "by a mapping that does not go around (\"wavelength\" is)");
+    reader_.read("direction", spec_.direction);
+    if (reader_.reads("height_map")) ASPERITY_CHECK(read_heights());
+    reader_.read("amplitude", spec_.amplitude);
+    if (reader_.reads("count")) read_wavelength();
+    reader_.read("phase", spec_.phase);
+    reader_.read("centre", spec_.centre);
+    reader_.read("wall", spec_.wall);
+    if (reader_.reads("average_roughness")) read_roughness();
+    reader_.read("correlation_length", spec_.correlation_length);
+    reader_.read("seed", spec_.seed);
+    // What goes around comes back where it started.
+    spec_.period = Vec2(around_, 0.0);
+    reader_.read("period", spec_.period);
     ASPERITY_CHECK(reader_.status());
     return placed(SurfaceFeature::build(spec_));
   }
@@ -162,36 +154,13 @@ class FeatureReader {
   }
 
  private:
-  [[nodiscard]] bool takes(std::string_view member) const {
-    const auto& taken = feature_parameters(spec_.kind);
-    return std::find(taken.begin(), taken.end(), member) != taken.end();
-  }
-
-  void refuse_others() {
-    static const std::vector<std::string> of_maps{"height_map", "channel",  "height", "height_range",
-                                                  "offset",     "white_is", "filter"};
-    const auto mine = [&](const std::string& key) {
-      const bool of_map = std::find(of_maps.begin(), of_maps.end(), key) != of_maps.end();
-      return key == "type" || key == "as" || (of_map && takes("heights")) || (key == "count" && takes("wavelength")) ||
-             (key == "average_roughness" && takes("roughness")) || takes(key);
-    };
-    reader_.refuse_unless(mine, fmt::format("by the feature \"{}\"", feature_name(spec_.kind)));
-    if (around_ <= 0.0) reader_.refuse({"count"}, "by a mapping that does not go around (\"wavelength\" is)");
-  }
-
-  double required(const char* key) {
-    reader_.require(key, fmt::format("a length above 0 ({})", accepted_units(Dimension::length)));
-    return reader_.quantity(key, Dimension::length, 0.0, Range::positive());
-  }
-
   /// R_q, or R_a of a Gaussian surface.
   void read_roughness() {
-    if (!reader_.has("average_roughness")) {
-      spec_.roughness = required("roughness");
-      return;
+    if (reader_.has("average_roughness")) {
+      spec_.roughness = std::sqrt(0.5 * std::numbers::pi) * reader_.get("average_roughness", 0.0);
+    } else {
+      reader_.read("roughness", spec_.roughness);
     }
-    reader_.refuse({"roughness"}, "beside average_roughness");
-    spec_.roughness = std::sqrt(0.5 * std::numbers::pi) * required("average_roughness");
   }
 
   void read_wavelength() {
@@ -200,8 +169,7 @@ class FeatureReader {
     const double second = spec_.heights ? static_cast<double>(spec_.heights->height()) / spec_.heights->width() : 1.0;
     const SceneJson* given = reader_.raw("wavelength");
     if (reader_.has("count")) {
-      reader_.refuse({"wavelength"}, "beside count");
-      const int count = reader_.integer("count", 1, 1, 1'000'000);
+      const int count = reader_.get("count", 1);
       const double length = around_ * std::abs(std::cos(spec_.direction)) / count;
       spec_.wavelength = Vec2(length, two ? second * length : 0.0);
       reader_.canonical().erase("count");
@@ -213,10 +181,10 @@ class FeatureReader {
     } else if (given == nullptr) {
       spec_.wavelength = sidecar_size_;
     } else if (!two || !given->is_array()) {
-      const double length = reader_.quantity("wavelength", Dimension::length, 0.0, Range::positive());
+      const double length = reader_.get("wavelength", 0.0);
       spec_.wavelength = Vec2(length, two ? second * length : 0.0);
     } else {
-      spec_.wavelength = reader_.pair("wavelength", Dimension::length, Vec2::Zero(), Range::positive());
+      reader_.read("wavelength", spec_.wavelength);
     }
     if (two) {
       reader_.write("wavelength", spec_.wavelength);
@@ -229,7 +197,7 @@ class FeatureReader {
     HeightSourceReader source(reader_, context_, "height_map", "feature", 0.0);
     ASPERITY_CHECK(source.read_source());
     ASPERITY_CHECK(source.read_scale(1.0));
-    const auto filter = reader_.choice("filter", Reconstruction::quadratic_bspline);
+    const auto filter = reader_.get<Reconstruction>("filter");
     ASPERITY_CHECK(reader_.status());
     ASPERITY_TRY(HeightMap heights, source.build(Wrap::repeat, filter));
     if (source.sidecar()) sidecar_size_ = source.tile();
@@ -261,14 +229,11 @@ class TextureReader {
                  MappingReader(reader_.raw("mapping"), reader_.place_of("mapping"), host_).read());
     part_.fine.mapping = std::move(mapping.value);
     reader_.write("mapping", std::move(mapping.canonical));
-    part_.fine.source = reader_.choice("source", TextureSource::features);
-    part_.fine.formulation = reader_.choice("formulation", Formulation::consistent);
-    ASPERITY_CHECK(reader_.status());
+    reader_.read_all(part_.fine);
     if (part_.fine.source == TextureSource::coat) {
       check_coat();
     } else {
-      as_ = reader_.choice_or_auto<FeatureScale>("as");
-      ASPERITY_CHECK(reader_.status());
+      as_ = reader_.get<std::optional<FeatureScale>>("as");
       ASPERITY_CHECK(read_features());
     }
     ASPERITY_CHECK(reader_.status());
@@ -279,7 +244,6 @@ class TextureReader {
 
  private:
   void check_coat() {
-    reader_.refuse({"features", "as"}, "where the coat is the source");
     if (!coated_ || host_.mesh == nullptr) {
       reader_.fail("source", "is \"coat\", and the surface has none", "\"features\", or a mesh with a coat",
                    ErrorCode::unsupported_pair);
@@ -292,16 +256,8 @@ class TextureReader {
 
   Status read_features() {
     const SceneJson* features = reader_.raw("features");
-    const char* accepted = "a feature, or an array of them";
     if (features == nullptr) return success();
     const bool one = features->is_object();
-    if (!one && !features->is_array()) {
-      reader_.fail_type("features", *features, accepted);
-    } else if (!one && (features->empty() || features->size() > FineFeatures::most_features)) {
-      reader_.fail("features", fmt::format("has {} features", features->size()),
-                   fmt::format("1 to {} of them", FineFeatures::most_features));
-    }
-    ASPERITY_CHECK(reader_.status());
     SceneJson canonical = SceneJson::array();
     for (std::size_t i = 0; i < (one ? 1 : features->size()); ++i) {
       const std::string place = one ? reader_.place_of("features") : reader_.place_of("features", i);
@@ -345,7 +301,7 @@ class TextureReader {
   Status read_feature(const SceneJson& json, const std::string& place, SceneJson& canonical) {
     FeatureReader one(json, place, around(), context_);
     ASPERITY_TRY(SurfaceFeature feature, one.read());
-    const std::optional<FeatureScale> as = one.reader().choice_or_auto<FeatureScale>("as", as_);
+    const std::optional<FeatureScale> as = one.reader().get("as", as_);
     ASPERITY_CHECK(one.reader().status());
     ASPERITY_CHECK(one.placed(part_.fine.mapping.check(feature)));
     ASPERITY_CHECK(one.placed(check_closed(feature)));

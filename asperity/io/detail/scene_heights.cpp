@@ -14,49 +14,32 @@
 namespace asperity {
 namespace {
 
-/// Reads a formula's parameters; every one that the formula does not take is refused by name. What they must be to one
-/// another (a flank within its rim) the formula itself checks.
+/// Reads a formula's parameters. What they must be to one another (a flank within its rim) the formula itself checks.
 class HeightGeneratorReader {
  public:
   explicit HeightGeneratorReader(ObjectReader& reader) : reader_(reader) {}
 
   MesostructureSpec read() {
-    spec_.kind = read_kind();
-    spec_.size = reader_.integer("size", 512, 2, 8192);
-    reader_.refuse_unless([&](const auto& key) { return key == "generator" || key == "size" || takes(key); },
-                          "by this generator");
+    spec_.kind = reader_.value_or(parse_mesostructure_kind(reader_.get("generator", std::string("flat"))),
+                                  MesostructureKind::flat);
+    spec_.size = reader_.get<int>("size");
     spec_ = completed(spec_);
-    if (takes("count")) spec_.count = reader_.integer("count", spec_.count, 1, std::max(1, spec_.size / 2));
-    if (takes("number")) read_number();
-    if (takes("seed")) read_seed();
-    if (takes("wall")) spec_.wall = share("wall", spec_.wall, 0.5);
-    if (takes("width")) spec_.width = share("width", *spec_.width, 1.0);
-    if (takes("flank")) spec_.flank = share("flank", own_flank(), 0.25);
-    if (takes("radius")) read_radius();
-    if (takes("rim")) spec_.rim = share("rim", spec_.rim, 0.5);
-    if (takes("field")) spec_.field = share("field", spec_.field, 1.0);
-    if (takes("overlap")) spec_.overlap = share("overlap", spec_.overlap, 0.9);
-    if (takes("hurst")) spec_.hurst = reader_.number("hurst", spec_.hurst, Range{0.05, 1.0});
-    if (takes("octaves")) spec_.octaves = reader_.integer("octaves", *spec_.octaves, 1, 12);
+    reader_.read("count", spec_.count);
+    if (spec_.number || reader_.has("number")) spec_.number = reader_.get("number", spec_.number.value_or(1));
+    reader_.read("seed", spec_.seed);
+    reader_.read("wall", spec_.wall);
+    reader_.read("width", spec_.width);
+    if (reader_.reads("flank")) spec_.flank = reader_.get("flank", own_flank());
+    if (reader_.reads("radius")) read_radius();
+    reader_.read("rim", spec_.rim);
+    reader_.read("field", spec_.field);
+    reader_.read("overlap", spec_.overlap);
+    reader_.read("hurst", spec_.hurst);
+    reader_.read("octaves", spec_.octaves);
     return spec_;
   }
 
  private:
-  MesostructureKind read_kind() {
-    const std::string name = reader_.text("generator", "");
-    return reader_.value_or(at_place(parse_mesostructure_kind(name), reader_.place_of("generator")),
-                            MesostructureKind::flat);
-  }
-
-  [[nodiscard]] bool takes(std::string_view parameter) const {
-    const auto taken = parameters_of(spec_.kind);
-    return std::find(taken.begin(), taken.end(), parameter) != taken.end();
-  }
-
-  double share(std::string_view key, double fallback, double most) {
-    return reader_.quantity(key, Dimension::ratio, fallback, Range{0.0, most});
-  }
-
   /// The groove's follows from its width, which may be stated.
   [[nodiscard]] double own_flank() const {
     MesostructureSpec open = spec_;
@@ -64,37 +47,17 @@ class HeightGeneratorReader {
     return *completed(open).flank;
   }
 
-  void read_number() {
-    if (spec_.number || reader_.has("number"))
-      spec_.number = reader_.integer("number", spec_.number.value_or(1), 1, 2000);
-  }
-
-  void read_seed() {
-    if (spec_.kind == MesostructureKind::rings && !spec_.number) {
-      reader_.refuse({"seed"}, "by the fixed arrangement (\"number\" scatters features)");
-    } else {
-      spec_.seed = reader_.seed("seed", spec_.seed);
-    }
-  }
-
   void read_radius() {
     const SceneJson* given = reader_.raw("radius");
-    const bool one = spec_.kind == MesostructureKind::groove;
-    if (given != nullptr && given->is_array() && !one) {
-      read_radius_range(*given);
-    } else if (given != nullptr || one) {
-      const double radius = reader_.quantity("radius", Dimension::ratio, spec_.radius->high, Range{0.001, 0.25});
+    if (given != nullptr && given->is_array()) {
+      spec_.radius = ShareRange{(*given)[0].get<double>(), (*given)[1].get<double>()};
+      reader_.write("radius", *given);
+    } else if (given != nullptr || spec_.kind == MesostructureKind::groove) {
+      const double radius = reader_.get("radius", spec_.radius->high);
       spec_.radius = ShareRange{radius, radius};
     } else {
       reader_.write("radius", Vec2(spec_.radius->low, spec_.radius->high));
     }
-  }
-
-  void read_radius_range(const SceneJson& given) {
-    const char* accepted = "a share of the tile from 0.001 to 0.25, or two [smallest, largest]";
-    if (!are_numbers(given, 2)) return reader_.fail("radius", "is no pair of numbers", accepted);
-    spec_.radius = ShareRange{given[0].get<double>(), given[1].get<double>()};
-    reader_.write("radius", given);
   }
 
   ObjectReader& reader_;
@@ -104,23 +67,12 @@ class HeightGeneratorReader {
 }  // namespace
 
 Status HeightSourceReader::read_source() {
-  const char* accepted = "an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library";
   const SceneJson* map = reader_.raw(key_);
-  if (map == nullptr) {
-    reader_.require(key_, accepted);
-  } else if (map->is_object()) {
-    generated_ = true;
-    if (map->contains("library")) {
-      ASPERITY_CHECK(read_library(*map));
-    } else {
-      read_generator(*map);
-    }
-    reader_.refuse({"channel", "white_is", "height_range"}, "for a generated height map");
-  } else if (map->is_string()) {
-    return read_image_source(map->get_ref<const std::string&>());
-  } else {
-    reader_.fail_type(key_, *map, accepted);
-  }
+  if (map == nullptr) return reader_.status();
+  if (map->is_string()) return read_image_source(map->get_ref<const std::string&>());
+  generated_ = true;
+  if (map->contains("library")) return read_library(*map);
+  read_generator(*map);
   return reader_.status();
 }
 
@@ -132,9 +84,9 @@ void HeightSourceReader::read_generator(const SceneJson& json) {
 
 Status HeightSourceReader::read_library(const SceneJson& json) {
   ObjectReader reader(json, reader_.place_of(key_), "library relief");
-  const std::string name = reader.text("library", "");
-  const int size = reader.integer("size", 512, 16, 4096);
-  const std::uint64_t seed = reader.seed("seed", 0);
+  const auto name = reader.get("library", std::string());
+  const auto size = reader.get<int>("size");
+  const auto seed = reader.get<std::uint64_t>("seed");
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(library_, at_place(library_mesostructure(name, size, seed), reader.place_of("library")));
   sidecar_ = HeightSidecar{"the library", size, size, 0.0, library_.amplitude, library_.tile / size};
@@ -144,7 +96,7 @@ Status HeightSourceReader::read_library(const SceneJson& json) {
 
 /// Floats as the file stores them: metres, unless the scene says what their range stands for.
 Status HeightSourceReader::read_floats() {
-  const std::string channel = reader_.text("channel", "automatic");
+  const std::string channel = reader_.get<std::string>("channel");
   ASPERITY_CHECK(reader_.status());
   ASPERITY_TRY(floats_, in_file(read_float_image(path_, channel), path_.string(), reader_.place_of("channel")));
   reader_.write(key_, path_.string());
@@ -157,7 +109,10 @@ Status HeightSourceReader::read_image_source(const std::string& file) {
   if (lower_extension(path_) == ".exr") return read_floats();
   ASPERITY_TRY(image_, in_file(read_image(path_), path_.string(), reader_.place_of(key_)));
   reader_.write(key_, path_.string());
-  channel_ = reader_.choice("channel", Channel::automatic);
+  const auto channel = reader_.get<std::string>("channel");
+  const std::optional<Channel> known = value_named<Channel>(channel);
+  if (!known) reader_.fail("channel", fmt::format("\"{}\" is not known", channel), name_list<Channel>("\""));
+  channel_ = known.value_or(Channel::automatic);
   return read_sidecar();
 }
 
@@ -201,19 +156,10 @@ Result<double> HeightSourceReader::height_of(const SceneJson& value, const std::
   const auto wrong = [&](ErrorCode code, std::string what) {
     return refused(code, std::move(what), place, accepted_height(range));
   };
-  double height = 0.0;
-  if (value.is_string()) {
-    const auto& text = value.get_ref<const std::string&>();
-    const bool share = mean_edge_ > 0.0 && text.find('%') != std::string::npos;
-    Result<double> parsed = parse_quantity(text, share ? Dimension::ratio : Dimension::length);
-    if (!parsed && share) return wrong(ErrorCode::bad_value, fmt::format("\"{}\" is no share of the mean edge", text));
-    if (!parsed) return wrong(ErrorCode::bad_value, parsed.error().what);
-    height = share ? *parsed * mean_edge_ : *parsed;
-  } else if (value.is_number()) {
-    height = value.get<double>();
-  } else {
-    return wrong(ErrorCode::bad_type, fmt::format("is {}", json_type(value)));
-  }
+  const bool share = value.is_string() && value.get_ref<const std::string&>().find('%') != std::string::npos;
+  if (share && mean_edge_ <= 0.0) return wrong(ErrorCode::bad_value, "is a share, and there is no mesh it could be of");
+  const auto read = from_option<double>(value_of(value, OptionType::length_or_share()));
+  const double height = share ? read * mean_edge_ : read;
   if (std::isfinite(height) && range.holds(height)) return height;
   return wrong(ErrorCode::bad_value, value.is_string() ? fmt::format("is {}", value.get_ref<const std::string&>())
                                                        : fmt::format("is {:.6g}", height));
@@ -228,11 +174,9 @@ double HeightSourceReader::read_height(const char* key, double fallback, const R
 }
 
 Status HeightSourceReader::read_scale(double magnify) {
-  static const std::vector<std::string> white{"high", "deep"};
   magnify_ = magnify;
-  if (!generated_) white_is_deep_ = reader_.choice("white_is", white, 0) == 1;
+  if (!generated_) white_is_deep_ = reader_.get<std::string>("white_is") == "deep";
   if (const SceneJson* range = reader_.raw("height_range")) {
-    reader_.refuse({"height", "offset"}, "beside height_range");
     read_range(*range);
     return reader_.status();
   }
@@ -273,12 +217,10 @@ Status HeightSourceReader::read_scale(double magnify) {
 }
 
 void HeightSourceReader::read_range(const SceneJson& range) {
-  const char* accepted = "two lengths [lowest, highest]";
-  if (!range.is_array() || range.size() != 2) return reader_.fail_type("height_range", range, accepted);
   double ends[2] = {0.0, 0.0};
   for (std::size_t i = 0; i < 2; ++i)
     ends[i] = reader_.value_or(height_of(range[i], reader_.place_of("height_range", i), Range{}), 0.0);
-  if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", accepted);
+  if (ends[1] < ends[0]) reader_.fail("height_range", "has its higher end first", "two lengths [lowest, highest]");
   scale_ = {ends[1] - ends[0], white_is_deep_ ? ends[1] : ends[0]};
   reader_.write("height_range", Vec2(ends[0], ends[1]));
 }

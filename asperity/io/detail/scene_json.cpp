@@ -1,14 +1,11 @@
 #include "asperity/io/detail/scene_json.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <set>
 
-#include "asperity/core/suggest.h"
 #include "asperity/io/detail/file_reading.h"
 
 namespace asperity {
@@ -63,14 +60,6 @@ const SceneJson& empty_object() {
   return empty;
 }
 
-const std::vector<std::string>& keys_of(std::string_view object) {
-  static const std::vector<std::string> none;
-  const auto& objects = scene_object_keys();
-  const auto found =
-      std::find_if(objects.begin(), objects.end(), [&](const auto& one) { return one.object == object; });
-  return found == objects.end() ? none : found->keys;
-}
-
 }  // namespace
 
 Result<SceneJson> parse_scene_json(std::string_view text, const std::string& name) {
@@ -113,41 +102,12 @@ const char* json_type(const SceneJson& value) {
   return "no value";
 }
 
-bool are_numbers(const SceneJson& value, std::size_t count) {
-  return value.is_array() && value.size() == count &&
-         std::all_of(value.begin(), value.end(), [](const SceneJson& one) { return one.is_number(); });
-}
-
-std::string Range::text() const {
-  if (std::isfinite(low) && std::isfinite(high))
-    return fmt::format("{}{:.4g} to {:.4g}", above_low ? "above " : "", low, high);
-  if (std::isfinite(low)) return above_low ? fmt::format("above {:.4g}", low) : fmt::format("{:.4g} or more", low);
-  if (std::isfinite(high)) return fmt::format("{:.4g} or less", high);
-  return "of any size";
-}
-
-ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object)
-    : ObjectReader(json, std::move(place), object, keys_of(object)) {}
-
 ObjectReader::ObjectReader(const SceneJson* json, std::string place, std::string_view object)
-    : ObjectReader(json == nullptr ? empty_object() : *json, std::move(place), object) {}
+    : ObjectReader(json == nullptr ? empty_object() : *json, std::move(place), scene_object(object)) {}
 
-ObjectReader::ObjectReader(const SceneJson& json, std::string place, std::string_view object,
-                           const std::vector<std::string>& known)
-    : json_(&json), known_(&known), place_(std::move(place)) {
-  if (!json.is_object()) {
-    error_ = refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place_, "an object");
-    return;
-  }
-  for (const auto& item : json.items()) {
-    if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
-    const std::string near = nearest_name(item.key(), known);
-    const bool vowel = object.find_first_of("aeiou") == 0;
-    std::string what = std::string(vowel ? "is not a key of an " : "is not a key of a ") + std::string(object);
-    if (!near.empty()) what += fmt::format("; did you mean \"{}\"?", near);
-    fail(item.key(), std::move(what), fmt::format("{}", fmt::join(known, ", ")), ErrorCode::bad_key);
-    return;
-  }
+ObjectReader::ObjectReader(const SceneJson& json, std::string place, const SceneObject& object)
+    : json_(&json), object_(&object), place_(std::move(place)) {
+  if (Status good = check_structure(json, place_, object); !good) error_ = std::move(good).error();
 }
 
 std::string ObjectReader::place_of(std::string_view key) const {
@@ -159,9 +119,36 @@ std::string ObjectReader::place_of(std::string_view key, std::size_t index) cons
 }
 
 const SceneJson* ObjectReader::raw(std::string_view key) const {
-  if (!json_->is_object()) return nullptr;
+  if (failed()) return nullptr;
   const auto found = json_->find(key);
   return found == json_->end() ? nullptr : &*found;
+}
+
+bool ObjectReader::reads(std::string_view key) const {
+  return !failed() && object_->reads(*object_->row(key, *json_), *json_);
+}
+
+OptionValue ObjectReader::value_at(std::string_view key, const SceneJson& value) {
+  const OptionType& type = object_->row(key, *json_)->type;
+  OptionValue answer = value_of(value, type);
+  if (type.is_direction()) {
+    const Vec3 direction = from_option<Vec3>(answer);
+    if (!direction.allFinite() || direction.norm() < 1e-150)
+      fail(key, "has no direction", "three numbers that are not all 0");
+  }
+  return answer;
+}
+
+void ObjectReader::read_bound(std::type_index settings, void* into, bool given) {
+  for (const Option& row : object_->rows) {
+    if (failed() || row.settings != settings || object_->row(row.key, *json_) != &row || !reads(row.key)) continue;
+    const SceneJson* value = raw(row.key);
+    if (value != nullptr && value->is_object()) continue;
+    if (value != nullptr) row.set(into, value_at(row.key, *value));
+    if (value == nullptr && row.otherwise.empty()) row.set(into, row.fallback);
+    if (value == nullptr && given) continue;
+    if (const OptionValue held = row.get(into); row.type.takes(held)) write(row.key, json_of(held));
+  }
 }
 
 void ObjectReader::fail(Error error) {
@@ -170,14 +157,6 @@ void ObjectReader::fail(Error error) {
 
 void ObjectReader::fail(std::string_view key, std::string what, std::string accepted, ErrorCode code) {
   fail(Error{code, std::move(what), {}, key.empty() ? place_ : place_of(key), std::move(accepted)});
-}
-
-void ObjectReader::fail_type(std::string_view key, const SceneJson& value, std::string accepted) {
-  fail(key, fmt::format("is {}", json_type(value)), std::move(accepted), ErrorCode::bad_type);
-}
-
-void ObjectReader::require(std::string_view key, std::string accepted) {
-  if (!has(key)) fail(key, "is missing", std::move(accepted));
 }
 
 void ObjectReader::refuse(std::initializer_list<std::string_view> keys, const std::string& why) {
@@ -192,183 +171,6 @@ void ObjectReader::take(std::string_view key, ObjectReader&& child) {
   } else {
     write(key, std::move(child.canonical_));
   }
-}
-
-double ObjectReader::value_of(const SceneJson& value, const std::string& place, Dimension dimension,
-                              const Range& range) {
-  const std::string units = accepted_units(dimension);
-  const std::string accepted = fmt::format("a number {}{}", range.text(), units.empty() ? "" : " (" + units + ")");
-  double number = 0.0;
-  if (value.is_number()) {
-    number = value.get<double>();
-  } else if (value.is_string()) {
-    number = value_or(at_place(parse_quantity(value.get_ref<const std::string&>(), dimension), place), 0.0);
-  } else {
-    fail(refused(ErrorCode::bad_type, fmt::format("is {}", json_type(value)), place, accepted));
-  }
-  if (!std::isfinite(number) || !range.holds(number)) {
-    fail(bad_value(fmt::format("is {:.6g}", number), place, accepted));
-  }
-  return number;
-}
-
-double ObjectReader::quantity(std::string_view key, Dimension dimension, double fallback, const Range& range) {
-  const SceneJson* value = raw(key);
-  const double answer = value == nullptr ? fallback : value_of(*value, place_of(key), dimension, range);
-  write(key, answer);
-  return failed() ? fallback : answer;
-}
-
-std::optional<double> ObjectReader::optional_quantity(std::string_view key, Dimension dimension, const Range& range) {
-  if (!has(key)) return std::nullopt;
-  return quantity(key, dimension, 0.0, range);
-}
-
-double ObjectReader::number(std::string_view key, double fallback, const Range& range) {
-  const SceneJson* value = raw(key);
-  if (value != nullptr && !value->is_number()) {
-    fail_type(key, *value, fmt::format("a number {}", range.text()));
-    return fallback;
-  }
-  return quantity(key, Dimension::ratio, fallback, range);
-}
-
-int ObjectReader::integer(std::string_view key, int fallback, int low, int high) {
-  const SceneJson* value = raw(key);
-  const std::string accepted = fmt::format("a whole number, {} to {}", low, high);
-  int answer = fallback;
-  if (value != nullptr && !value->is_number()) {
-    fail_type(key, *value, accepted);
-  } else if (value != nullptr) {
-    const double number = value->get<double>();
-    if (number >= low && number <= high && number == std::floor(number)) {
-      answer = static_cast<int>(number);
-    } else {
-      fail(key, fmt::format("is {}", number), accepted);
-    }
-  }
-  write(key, answer);
-  return answer;
-}
-
-std::uint64_t ObjectReader::seed(std::string_view key, std::uint64_t fallback) {
-  const SceneJson* value = raw(key);
-  const char* accepted = "a whole number, 0 or more";
-  if (value != nullptr && value->is_number() && !value->is_number_unsigned())
-    fail(key, fmt::format("is {}", value->get<double>()), accepted);
-  return plain(key, fallback, &SceneJson::is_number_unsigned, accepted);
-}
-
-template <class T>
-T ObjectReader::plain(std::string_view key, T fallback, bool (SceneJson::*is)() const noexcept, const char* accepted) {
-  const SceneJson* value = raw(key);
-  if (value != nullptr && (value->*is)()) {
-    fallback = value->get<T>();
-  } else if (value != nullptr) {
-    fail_type(key, *value, accepted);
-  }
-  write(key, fallback);
-  return fallback;
-}
-
-bool ObjectReader::boolean(std::string_view key, bool fallback) {
-  return plain(key, fallback, &SceneJson::is_boolean, "true or false");
-}
-
-std::string ObjectReader::text(std::string_view key, std::string fallback) {
-  return plain(key, std::move(fallback), &SceneJson::is_string, "a text");
-}
-
-std::string ObjectReader::required_text(std::string_view key, std::string accepted) {
-  std::string given = text(key, "");
-  if (given.empty()) fail(key, "is missing", std::move(accepted));
-  return given;
-}
-
-std::size_t ObjectReader::choice(std::string_view key, std::span<const std::string> names, std::size_t fallback) {
-  const std::string list = fmt::format("\"{}\"", fmt::join(names, "\", \""));
-  const SceneJson* value = raw(key);
-  std::size_t answer = fallback;
-  if (value != nullptr && !value->is_string()) {
-    fail_type(key, *value, list);
-  } else if (value != nullptr) {
-    const auto& given = value->get_ref<const std::string&>();
-    const auto found = std::find(names.begin(), names.end(), given);
-    if (found != names.end()) {
-      answer = static_cast<std::size_t>(found - names.begin());
-    } else {
-      const std::string near = nearest_name(given, names);
-      fail(key,
-           fmt::format("\"{}\" is not known{}", given, near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)),
-           list);
-    }
-  }
-  write(key, names[answer]);
-  return answer;
-}
-
-template <class Vector>
-Vector ObjectReader::values_of(const SceneJson& values, std::string_view key, Dimension dimension, const Range& range) {
-  Vector answer;
-  for (std::size_t i = 0; i < values.size(); ++i)
-    answer[static_cast<int>(i)] = value_of(values[i], place_of(key, i), dimension, range);
-  return answer;
-}
-
-Vec3 ObjectReader::lengths(std::string_view key, const Vec3& fallback) {
-  const char* accepted = "three lengths [x, y, z] (m, or with a unit)";
-  const SceneJson* value = raw(key);
-  Vec3 answer = fallback;
-  if (value != nullptr && !value->is_array()) {
-    fail_type(key, *value, accepted);
-  } else if (value != nullptr && value->size() != 3) {
-    fail(key, fmt::format("has {} numbers", value->size()), accepted);
-  } else if (value != nullptr) {
-    answer = values_of<Vec3>(*value, key, Dimension::length, {});
-  }
-  write(key, answer);
-  return answer;
-}
-
-Vec2 ObjectReader::pair(std::string_view key, Dimension dimension, const Vec2& fallback, const Range& range) {
-  const SceneJson* value = raw(key);
-  Vec2 answer = fallback;
-  if (value != nullptr && !value->is_array()) {
-    answer = Vec2::Constant(value_of(*value, place_of(key), dimension, range));
-  } else if (value != nullptr && value->size() != 2) {
-    const char* what = dimension == Dimension::length ? "length" : "number";
-    fail(key, fmt::format("has {} {}s", value->size(), what), fmt::format("one {}, or two [along u, along v]", what));
-  } else if (value != nullptr) {
-    answer = values_of<Vec2>(*value, key, dimension, range);
-  }
-  write(key, answer);
-  return failed() ? fallback : answer;
-}
-
-Vec3 ObjectReader::vector(std::string_view key, Dimension dimension, const Vec3& fallback, double most) {
-  const SceneJson* value = raw(key);
-  Vec3 answer = fallback;
-  if (value != nullptr && (!value->is_array() || value->size() != 3)) {
-    fail_type(key, *value, "three quantities [x, y, z]");
-  } else if (value != nullptr) {
-    answer = values_of<Vec3>(*value, key, dimension, Range{-most, most});
-  }
-  write(key, answer);
-  return failed() ? fallback : answer;
-}
-
-Vec3 ObjectReader::direction(std::string_view key, const Vec3& fallback) {
-  const SceneJson* value = raw(key);
-  Vec3 answer = fallback;
-  if (value != nullptr && !are_numbers(*value, 3)) {
-    fail_type(key, *value, "three numbers [x, y, z]");
-  } else if (value != nullptr) {
-    for (std::size_t i = 0; i < 3; ++i) answer[static_cast<int>(i)] = (*value)[i].get<double>();
-    if (!answer.allFinite() || answer.norm() < 1e-150)
-      fail(key, "has no direction", "three numbers that are not all 0");
-  }
-  write(key, answer);
-  return answer;
 }
 
 }  // namespace asperity

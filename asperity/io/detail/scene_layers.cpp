@@ -10,38 +10,9 @@
 namespace asperity {
 namespace {
 
-constexpr double fastest = 100.0;       // m/s
-constexpr double most_frequency = 1e4;  // Hz: beyond any device's rate
-constexpr double most_factor = 1e3;
-
-/// Reads a solid's numbers; every one that the kind does not take is refused by name.
 Result<CoatLayer> read_solid(ObjectReader& reader) {
-  reader.refuse({"height_map", "channel", "height", "height_range", "offset", "white_is", "repeat", "tile", "filter"},
-                "by a solid");
   SolidSpec spec;
-  spec.kind = reader.choice("solid", SolidKind::noise);
-  const bool noise = spec.kind == SolidKind::noise;
-  const bool round = spec.kind == SolidKind::rings || spec.kind == SolidKind::pulse;
-  const bool directed = spec.kind == SolidKind::waves;
-  const char* by = "by this solid";
-  if (!noise) reader.refuse({"drift", "octaves", "persistence", "seed"}, by);
-  if (noise) reader.refuse({"frequency"}, by);
-  if (noise || spec.kind == SolidKind::pulse) reader.refuse({"phase"}, by);
-  if (!round) reader.refuse({"centre"}, by);
-  if (!directed) reader.refuse({"direction"}, by);
-  spec.amplitude = reader.quantity("amplitude", Dimension::length, spec.amplitude, Range::positive());
-  spec.wavelength = reader.quantity("wavelength", Dimension::length, spec.wavelength, Range::positive());
-  if (directed) spec.direction = reader.direction("direction", spec.direction);
-  if (round) spec.centre = reader.lengths("centre", spec.centre);
-  if (!noise) {
-    if (spec.kind != SolidKind::pulse) spec.phase = reader.quantity("phase", Dimension::angle, 0.0);
-    spec.frequency = reader.quantity("frequency", Dimension::frequency, 0.0, Range{0.0, most_frequency});
-  } else {
-    spec.drift = reader.vector("drift", Dimension::speed, spec.drift, fastest);
-    spec.octaves = reader.integer("octaves", spec.octaves, 1, 8);
-    spec.persistence = reader.number("persistence", spec.persistence, Range{0.0, 1.0});
-    spec.seed = reader.seed("seed", spec.seed);
-  }
+  reader.read_all(spec);
   ASPERITY_CHECK(reader.status());
   ASPERITY_TRY(SolidMesostructure solid, at_place(SolidMesostructure::build(spec), reader.place()));
   CoatLayer layer;
@@ -54,15 +25,15 @@ Result<CoatLayer> read_map(ObjectReader& reader, const LayerHost& host, SceneCon
   HeightSourceReader source(reader, context, "height_map", "layer", host.mean_edge);
   ASPERITY_CHECK(source.read_source());
   ASPERITY_CHECK(source.read_scale(1.0));
-  const auto filter = reader.choice("filter", Reconstruction::quadratic_bspline);
+  const auto filter = reader.get<Reconstruction>("filter");
   CoatLayer layer;
   Vec2 tile = host.tile;
   if (host.triplanar) {
     reader.refuse({"repeat"}, "by the triplanar mapping (\"tile\" is the size of one repeat)");
-    tile = reader.pair("tile", Dimension::length, source.sidecar() ? source.tile() : tile, Range::positive());
+    tile = reader.get("tile", source.sidecar() ? source.tile() : tile);
   } else {
     reader.refuse({"tile"}, "by this mapping (\"repeat\" says how often the map fits into one of the coat's)");
-    const double repeat = reader.number("repeat", 1.0, Range::positive());
+    const auto repeat = reader.get<double>("repeat");
     layer.repeat = Vec2(repeat, repeat);
     tile = host.tile / repeat;
   }
@@ -78,28 +49,15 @@ Result<CoatLayer> read_map(ObjectReader& reader, const LayerHost& host, SceneCon
 
 /// Values over the surface, from black to white.
 Result<std::shared_ptr<const HeightMap>> read_values(const SceneJson& json, const std::string& place,
-                                                     MaterialChannel channel, const LayerHost& host,
-                                                     SceneContext& context, SceneJson& canonical) {
-  ObjectReader reader(json, place, "material map");
+                                                     MaterialChannel channel, const std::string& object,
+                                                     const LayerHost& host, SceneContext& context,
+                                                     SceneJson& canonical) {
+  ObjectReader reader(json, place, object);
   ASPERITY_CHECK(reader.status());
   HeightSourceReader source(reader, context, "image", to_string(channel), 0.0);
   ASPERITY_CHECK(source.read_source());
-  const auto value = [&](const char* key) {
-    const Range range = channel == MaterialChannel::stiffness ? Range::positive() : Range::not_negative();
-    reader.require(key, "what black (low) and white (high) stand for");
-    switch (channel) {
-      case MaterialChannel::stiffness:
-      case MaterialChannel::magnetism: return reader.quantity(key, Dimension::stiffness, 1.0, range);
-      case MaterialChannel::damping:
-      case MaterialChannel::viscosity: return reader.quantity(key, Dimension::damping, 1.0, range);
-      case MaterialChannel::stickiness: return reader.quantity(key, Dimension::force, 1.0, range);
-      case MaterialChannel::friction: break;
-    }
-    return reader.number(key, 1.0, Range{0.0, most_factor});
-  };
-  const double low = value("low");
-  const double high = value("high");
-  ASPERITY_CHECK(reader.status());
+  const double low = reader.get("low", 1.0);
+  const double high = reader.get("high", 1.0);
   // Nothing between two texels may lie outside them.
   ASPERITY_TRY(HeightMap values, source.build_between(low, high, host.wrap, Reconstruction::bilinear));
   canonical = std::move(reader.canonical());
@@ -110,10 +68,8 @@ Result<std::shared_ptr<const HeightMap>> read_values(const SceneJson& json, cons
 Status read_lay_map(const SceneJson& json, const std::string& place, const LayerHost& host, SceneContext& context,
                     MaterialMaps::Parts& parts, SceneJson& canonical) {
   ObjectReader reader(json, place, "lay map");
-  const std::string name =
-      reader.required_text("image", "an image file whose red and green are the direction, 0.5 none");
   ASPERITY_CHECK(reader.status());
-  const std::filesystem::path path = context.resolve(name);
+  const std::filesystem::path path = context.resolve(reader.get("image", std::string()));
   reader.write("image", path.string());
   ASPERITY_TRY(const Image image, in_file(read_image(path), path.string()));
   const HeightMapSettings settings{2.0, -1.0, false, host.wrap, Reconstruction::bilinear};
@@ -140,9 +96,7 @@ Result<std::optional<DetailSettings>> read_detail(ObjectReader& coat) {
   const SceneJson wrapped = json->is_string() ? SceneJson{{"kind", *json}} : *json;
   ObjectReader reader(wrapped, coat.place_of("detail"), "detail");
   DetailSettings detail;
-  detail.kind = reader.choice("kind", DetailKind::low_pass);
-  detail.finest = reader.quantity("finest", Dimension::length, 0.0, Range::not_negative());
-  detail.levels = reader.integer("levels", 0, 0, DetailPyramid::most_levels);
+  reader.read_all(detail);
   ASPERITY_CHECK(reader.status());
   coat.take("detail", std::move(reader));
   return std::optional<DetailSettings>(detail);
@@ -152,22 +106,11 @@ Result<std::vector<CoatLayer>> read_layers(ObjectReader& coat, const LayerHost& 
   std::vector<CoatLayer> layers;
   const SceneJson* json = coat.raw("layers");
   if (json == nullptr) return layers;
-  if (!json->is_array() || json->size() > Coat::most_layers) {
-    coat.fail_type("layers", *json, fmt::format("an array of at most {} maps and solids", Coat::most_layers));
-    return *coat.error();
-  }
   SceneJson canonical = SceneJson::array();
   for (std::size_t i = 0; i < json->size(); ++i) {
     ObjectReader reader((*json)[i], coat.place_of("layers", i), "layer");
     ASPERITY_CHECK(reader.status());
-    const bool solid = reader.has("solid");
-    if (!solid) {
-      reader.refuse({"amplitude", "wavelength", "direction", "centre", "phase", "frequency", "drift", "octaves",
-                     "persistence", "seed"},
-                    fmt::format("by a map (\"solid\" names one of {})", name_list<SolidKind>()));
-      ASPERITY_CHECK(reader.status());
-    }
-    ASPERITY_TRY(CoatLayer layer, solid ? read_solid(reader) : read_map(reader, host, context));
+    ASPERITY_TRY(CoatLayer layer, reader.has("solid") ? read_solid(reader) : read_map(reader, host, context));
     ASPERITY_CHECK(reader.status());
     layers.push_back(std::move(layer));
     canonical.push_back(std::move(reader.canonical()));
@@ -188,8 +131,9 @@ Result<std::shared_ptr<const MaterialMaps>> read_material_maps(ObjectReader& coa
     const SceneJson* map = reader.raw(to_string(channel));
     if (map == nullptr) continue;
     SceneJson canonical;
+    const std::string& object = scene_object("material maps").row(to_string(channel), *json)->type.word;
     ASPERITY_TRY(parts.channels[c],
-                 read_values(*map, reader.place_of(to_string(channel)), channel, host, context, canonical));
+                 read_values(*map, reader.place_of(to_string(channel)), channel, object, host, context, canonical));
     reader.write(to_string(channel), std::move(canonical));
   }
   if (const SceneJson* lay = reader.raw("lay")) {

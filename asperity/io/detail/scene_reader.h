@@ -52,10 +52,10 @@ struct ScenePart {
   SceneJson canonical;
 };
 
-/// Text (a built-in profile) or object (a profile with changes). `json` may be nullptr: phantom-desktop. [build]
-Result<ScenePart<DeviceProfile>> read_device(const SceneJson* json, const std::string& place);
+/// Text (a built-in profile) or object (a profile with changes). [build]
+Result<ScenePart<DeviceProfile>> read_device(const SceneJson& json, const std::string& place);
 /// Text (a preset) or object. [build]
-Result<ScenePart<HandImpedance>> read_hand(const SceneJson* json, const std::string& place);
+Result<ScenePart<HandImpedance>> read_hand(const SceneJson& json, const std::string& place);
 
 /// The scene's `probe` object.
 struct ProbeSettings {
@@ -136,13 +136,15 @@ struct CoatSource {
   CoatParts parts;
   CoatSettings settings;
 };
-/// What the coat of `mesh` is made of. [build]
+/// What the coat of `mesh` is made of. `object`: "coat", or "mesostructure", of which heights alone are read. [build]
 Result<ScenePart<CoatSource>> read_coat(const SceneJson& json, const std::string& place, const TriangleMesh& mesh,
-                                        SceneContext& context);
+                                        SceneContext& context, std::string_view object = "coat");
 
 /// One entry of `surfaces`. [build]
 Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::string& place, SceneContext& context);
 
+/// Reads `axis` and `angle`, no turn where there is neither. [build]
+Quat read_turn(ObjectReader& reader);
 /// Reads `motion` of a surface. [build]
 Result<Motion> read_motion(ObjectReader& surface);
 /// Reads the scene's `view`; `bounds` of the base meshes (m, world), for defaults. [build]
