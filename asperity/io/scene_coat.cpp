@@ -29,7 +29,7 @@ class CoatReader {
     ASPERITY_CHECK(reader_.status());
     ASPERITY_CHECK(source_.read_scale(magnify_));
     ASPERITY_TRY(HeightMap heights, source_.build(wrap_, reconstruction_));
-    ASPERITY_CHECK(check_amplitude(heights));
+    ASPERITY_CHECK(check_amplitude(heights, reader_));
     ASPERITY_TRY(const Vec2 tile, read_tile(heights));
     ASPERITY_TRY(Mesostructure maps, with_normals(std::move(heights), tile));
     CoatSettings settings{mapping_, repeat_, {}};
@@ -44,6 +44,7 @@ class CoatReader {
     }
     CoatParts parts;
     parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(maps)));
+    ASPERITY_CHECK(read_groups(parts, host));
     ASPERITY_TRY(parts.layers, read_layers(reader_, host, context_));
     ASPERITY_TRY(parts.materials, read_material_maps(reader_, host, context_));
     ASPERITY_CHECK(reader_.status());
@@ -51,6 +52,48 @@ class CoatReader {
   }
 
  private:
+  /// Maps that groups of faces wear in place of the coat's own.
+  Status read_groups(CoatParts& parts, const LayerHost& host) {
+    const SceneJson* groups = reader_.raw("groups");
+    if (groups == nullptr) return reader_.status();
+    parts.map_of_face.assign(mesh_.triangles().size(), 0);
+    SceneJson canonical = SceneJson::array();
+    for (std::size_t i = 0; i < groups->size(); ++i) {
+      ObjectReader group((*groups)[i], reader_.place_of("groups", i), "face group");
+      ASPERITY_CHECK(read_faces(group, static_cast<std::uint8_t>(i + 1), parts.map_of_face));
+      HeightSourceReader source(group, context_, "height_map", "face group", mesh_.mean_edge());
+      ASPERITY_CHECK(source.read_source());
+      ASPERITY_CHECK(source.read_scale(magnify_));
+      ASPERITY_TRY(HeightMap heights, source.build(wrap_, group.get<Reconstruction>("filter")));
+      ASPERITY_CHECK(check_amplitude(heights, group));
+      ASPERITY_TRY(Mesostructure maps, Mesostructure::build(std::move(heights), host.tile));
+      if (host.detail) {
+        ASPERITY_TRY(maps, with_detail(std::move(maps), *host.detail, group.place()));
+      }
+      parts.maps.push_back(std::make_shared<const Mesostructure>(std::move(maps)));
+      canonical.push_back(std::move(group.canonical()));
+    }
+    reader_.write("groups", std::move(canonical));
+    return reader_.status();
+  }
+
+  static Status read_faces(ObjectReader& group, std::uint8_t map, std::vector<std::uint8_t>& map_of_face) {
+    ASPERITY_CHECK(group.status());
+    const SceneJson& ranges = *group.raw("faces");
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      const double first = ranges[i][0].get<double>();
+      const double last = ranges[i][1].get<double>();
+      if (!(first <= last && last < static_cast<double>(map_of_face.size()))) {
+        return bad_value(fmt::format("is {} to {}", first, last), group.place_of("faces", i),
+                         fmt::format("faces from 0 to {}, the first one first", map_of_face.size() - 1));
+      }
+      std::fill(map_of_face.begin() + static_cast<std::ptrdiff_t>(first),
+                map_of_face.begin() + static_cast<std::ptrdiff_t>(last) + 1, map);
+    }
+    group.write("faces", ranges);
+    return success();
+  }
+
   void read_mapping() {
     const std::optional<Mapping> given = reader_.get<std::optional<Mapping>>("mapping");
     mapping_ = given.value_or(mesh_.has_uvs() ? Mapping::uv : Mapping::triplanar);
@@ -63,16 +106,16 @@ class CoatReader {
     reconstruction_ = reader_.get<Reconstruction>("filter");
   }
 
-  Status check_amplitude(const HeightMap& heights) {
+  Status check_amplitude(const HeightMap& heights, const ObjectReader& from) {
     // hrm-2010, 5.4.1: what exceeds it is a candidate for finer remeshing. Rounding of just 15 % is not beyond it.
     constexpr double remesh_share = 0.15 * (1.0 + 1e-9);
     const double highest = std::max(std::abs(heights.lowest()), std::abs(heights.highest()));
     const double half = 0.5 * mesh_.bounds().diagonal();
-    const char* key = reader_.has("height_range") ? "height_range" : (reader_.has("height") ? "height" : "height_map");
+    const char* key = from.has("height_range") ? "height_range" : (from.has("height") ? "height" : "height_map");
     if (highest > half) {
       return bad_value(fmt::format("gives a relief of {} on an object with a diagonal of {}", format_length(highest),
                                    format_length(2.0 * half)),
-                       reader_.place_of(key),
+                       from.place_of(key),
                        fmt::format("heights of at most half the diagonal ({})", format_length(half)));
     }
     const double range = heights.highest() - heights.lowest();

@@ -60,6 +60,10 @@ void coat(SceneObject& row) {
       or_else("none"), by_contents("a map that is too large or too small for it"));
   row("layers", Type::array(Type::object("layer"), 0, Coat::most_layers, "layers"),
       "Further mesostructures, summed to the first.", by_contents("layers that the coat cannot have together"));
+  row("groups", Type::array(Type::object("face group"), 1, 254, "groups"),
+      "Groups of faces that wear another map in place of the coat's own, laid and joined as it is; where faces stand "
+      "in "
+      "several groups, the last counts.");
   row("maps", Type::object("material maps"), "Properties of the surface that vary over it, laid as the heights are.",
       by_contents("maps that are none"));
   row("closing", Type::object("closing"),
@@ -83,6 +87,19 @@ void mesostructure(SceneObject& row) {
       one.contents.clear();
     }
   }
+}
+
+void face_group(SceneObject& row) {
+  row("faces",
+      Type::array(Type::array(Type::integer(0, 4294967294.0), 2, 2, "numbers").saying("two faces [first, last]"), 1,
+                  1000000, "ranges")
+          .saying("an array of ranges of faces, each [first, last]"),
+      "Faces by their number in the mesh, from 0, each range [first, last]. Triangles without area are left out, and "
+      "not counted.",
+      always_there, by_contents("faces that the mesh does not have, and ranges that end before they begin"));
+  heights(row, true, [](Option&) {});
+  row.rows[1].required = Test();
+  filter(row);
 }
 
 /// Every spelling of the formulas that take a parameter; of all for none.
@@ -322,6 +339,7 @@ Rows coat_rows() {
        blend_map},
       {{"detail", "Levels of detail of a coat (formulation D5)."}, detail_levels},
       {{"layer", "A mesostructure summed to the coat: a map, or a solid."}, layer},
+      {{"face group", "Faces of a coated mesh that wear a map of their own."}, face_group},
       {{"material maps", "Maps of the material, in place of its constant properties."}, material_maps},
       {{"stiffness map", "A map of stiffness."}, [](SceneObject& row) { values_map(row, stiffness(positive)); }},
       {{"damping map", "A map of damping."}, [](SceneObject& row) { values_map(row, damping(not_negative)); }},

@@ -54,6 +54,43 @@ class ReliefScene : public ExperimentTest {
   }
 };
 
+TEST_F(ReliefScene, GroupsOfFacesWearMapsOfTheirOwn) {
+  const std::string flat = R"("height_map":{"generator":"H_0","size":16},"height":0,"mapping":"per_face")";
+  const std::string high = R"("height_map":{"generator":"H_0","size":16},"height":"0.3 mm")";
+  const Experiment some = good(scene(flat + R"(,"groups":[{"faces":[[0,3],[8,8]],)" + high + "}]"));
+  const TriangleMesh& mesh = base_of(instance(some).surface)->mesh();
+  ASSERT_EQ(mesh.triangles().size(), 32U);
+  const Vec3 middle = Vec3::Constant(1.0 / 3.0);
+  for (std::uint32_t face = 0; face < 32; ++face) {
+    const double height = face <= 3 || face == 8 ? 0.3e-3 : 0.0;
+    EXPECT_NEAR(coat(some).sample(mesh, face, middle).height, height, 1e-9) << face;
+  }
+  comes_back(some);
+  // To the forces: a group of all faces is the coat itself, and what groups overlap the last one has.
+  const std::uint64_t whole = short_run(good(scene(high + R"(,"mapping":"per_face")")), 1500);
+  EXPECT_EQ(short_run(good(scene(flat + R"(,"groups":[{"faces":[[0,31]],)" + high + "}]")), 1500), whole);
+  const std::string twice = R"(,"groups":[{"faces":[[0,31]],"height_map":"map.png","height":0},{"faces":[[0,31]],)";
+  EXPECT_EQ(short_run(good(scene(flat + twice + high + "}]")), 1500), whole);
+  EXPECT_NE(short_run(good(scene(flat)), 1500), whole);
+}
+
+TEST_F(ReliefScene, WrongGroupsAreRefusedByName) {
+  const auto group = [&](const std::string& keys, const std::string& place, const std::string& part) {
+    refused(scene(ramp_coat(R"("groups":[{)" + keys + "}]")), "surfaces[0].coat.groups" + place, part);
+  };
+  const std::string map = R"("height_map":"map.png","height":"0.1 mm")";
+  group(map, "[0].faces", "is missing");
+  group(R"("faces":[[0,3]])", "[0].height_map", "is missing");
+  group(R"("faces":[],)" + map, "[0].faces", "has 0 ranges");
+  group(R"("faces":[3],)" + map, "[0].faces[0]", "two faces [first, last]");
+  group(R"("faces":[[0,1.5]],)" + map, "[0].faces[0][1]", "whole number");
+  group(R"("faces":[[3,2]],)" + map, "[0].faces[0]", "the first one first");
+  group(R"("faces":[[0,1],[30,32]],)" + map, "[0].faces[1]", "faces from 0 to 31");
+  group(R"("faces":[[0,1]],"tile":1,)" + map, "[0].tile", "is not a key of a face group");
+  group(R"("faces":[[0,1]],"height_map":"map.png","height":"1 m")", "[0].height", "half the diagonal");
+  refused(scene(ramp_coat(R"("groups":[])")), "surfaces[0].coat.groups", "1 to 254");
+}
+
 TEST_F(ReliefScene, LayersAreSummed) {
   const Experiment one = good(scene(ramp_coat()));
   const Experiment two = good(scene(ramp_coat(
