@@ -24,6 +24,9 @@
 
 namespace asperity {
 
+/// Every unit that parse_quantity accepts for a dimension, each way it may be spelled. [any]
+std::vector<std::string> unit_names(Dimension dimension);
+
 /// Interval that a number has to lie in.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "asperity/core/option.h"
+
 namespace asperity {
 namespace {
 

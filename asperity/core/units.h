@@ -4,7 +4,6 @@
 #include <chrono>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "asperity/core/result.h"
 
@@ -35,9 +34,6 @@ Result<double> parse_quantity(std::string_view text, Dimension dimension);
 
 /// The units `parse_quantity` accepts for `dimension`, for messages and documentation ("m, cm, mm, um, in"). [any]
 std::string accepted_units(Dimension dimension);
-
-/// Every unit that it accepts, each way it may be spelled. [any]
-std::vector<std::string> unit_names(Dimension dimension);
 
 /// `metres` written for people, with the unit that suits its size: "2.00 mm", "350 um". [any]
 std::string format_length(double metres);

@@ -158,8 +158,37 @@ std::string words_for(const OptionType& type) {
                      ranged ? " " + type.range.text() : "", units, type.share ? ", or a share (\"10 %\")" : "");
 }
 
+/// A condition in words: "`type` is circle, spiral", "no `normal_force`".
+std::string words_for(const OptionTest& test) {
+  const auto each = [&](const char* between) {
+    std::string list;
+    for (const OptionTest& part : test.of) list += (list.empty() ? "" : between) + words_for(part);
+    return list;
+  };
+  switch (test.kind) {
+    case OptionTest::Kind::given: return fmt::format("`{}`", test.path);
+    case OptionTest::Kind::is: return fmt::format("`{}` {}", test.path, fmt::join(test.names, ", "));
+    case OptionTest::Kind::an_object: return fmt::format("`{}` as an object", test.path);
+    case OptionTest::Kind::filled: return fmt::format("entries in `{}`", test.path);
+    case OptionTest::Kind::all: return each(" and ");
+    case OptionTest::Kind::any: return test.of.empty() ? "nothing" : each(" or ");
+    case OptionTest::Kind::none: break;
+  }
+  return "no " + each(", no ");
+}
+
+/// When a row is read, and when it has to be there.
+std::string conditions_of(const Option& row) {
+  std::string text;
+  for (const OptionTest& test : row.only) text += (text.empty() ? " With " : "; ") + words_for(test);
+  if (!text.empty()) text += ".";
+  const std::string when = row.required ? words_for(*row.required) : "";
+  if (row.required) text += when.empty() ? " Has to be there." : " Has to be there with " + when + ".";
+  return text;
+}
+
 std::string description_of(const Option& row) {
-  std::string text = row.help;
+  std::string text = row.help + conditions_of(row);
   const OptionKind kind = row.type.kind;
   std::string type = kind == OptionKind::quantity || kind == OptionKind::array ? words_for(row.type) : std::string();
   if (!type.empty()) type[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(type[0])));
@@ -263,9 +292,7 @@ std::string type_words(const OptionType& type) {
 
 /// One row as a line of text: "| `speed` | a number ... | default | help |".
 std::string line_of(const Option& row) {
-  std::string help = row.help;
-  if (row.required)
-    help += row.required->of.empty() && row.required->kind == OptionTest::Kind::all ? " Has to be there." : "";
+  std::string help = row.help + conditions_of(row);
   if (!row.contents.empty()) help += fmt::format(" *Refused when it is read: {}.*", row.contents);
   return fmt::format("| `{}` | {} | {} | {} |\n", row.key, type_words(row.type), default_words(row), help);
 }
@@ -308,7 +335,7 @@ Result<std::string> scene_key_help(std::string_view path) {
   std::string text;
   for (const Option* row : rows_at(path)) {
     const std::string fallback = default_words(*row);
-    text += fmt::format("{}\n  {}\n  takes: {}\n{}{}", row->key, row->help, row->type.accepted(),
+    text += fmt::format("{}\n  {}\n  takes: {}\n{}{}", row->key, row->help + conditions_of(*row), row->type.accepted(),
                         fallback.empty() ? "" : fmt::format("  default: {}\n", fallback),
                         row->contents.empty() ? "" : fmt::format("  refused when it is read: {}\n", row->contents));
   }

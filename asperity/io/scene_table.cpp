@@ -76,7 +76,10 @@ bool admits(const OptionType& type, const SceneJson& json) {
 /// Of several objects the one whose first key is there, a program's own before all others.
 const OptionType& object_among(const std::vector<const OptionType*>& parts, const SceneJson& json) {
   for (const OptionType* part : parts) {
-    if (part->kind == OptionKind::numbers || json.contains(scene_object(part->word).rows.front().key)) return *part;
+    if (part->kind == OptionKind::numbers) return *part;
+  }
+  for (const OptionType* part : parts) {
+    if (json.contains(scene_object(part->word).rows.front().key)) return *part;
   }
   return *parts.front();
 }
@@ -117,6 +120,10 @@ class StructureCheck {
   Status object(const SceneJson& json, const std::string& place, const SceneObject& object) {
     if (!json.is_object()) return wrong_type(json, place, "an object");
     const auto at = [&](const std::string& key) { return place.empty() ? key : place + "." + key; };
+    // Of a law or a shape that nobody knows its keys say nothing.
+    const Option& first = object.rows.front();
+    if (first.type.kind == OptionKind::choice && json.contains(first.key))
+      ASPERITY_CHECK(value(json[first.key], at(first.key), first.type));
     for (const auto& item : json.items()) {
       if (object.row(item.key(), json) == nullptr) return unknown_key(item.key(), at(item.key()), object);
     }

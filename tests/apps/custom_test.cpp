@@ -86,7 +86,7 @@ TEST_F(CustomPrograms, LawReplaysToTheSameForces) {
   // Who does not know the law says so.
   const Call stranger = run(ASPERITY_PROGRAM, "replay '" + trace.string() + "'");
   EXPECT_EQ(stranger.code, 2);
-  EXPECT_TRUE(has(stranger.err, "\"hunt-crossley\" is no law")) << stranger.err;
+  EXPECT_TRUE(has(stranger.err, "law.type: \"hunt-crossley\" is not known")) << stranger.err;
 }
 
 TEST_F(CustomPrograms, LawsNumbersAreReadByName) {

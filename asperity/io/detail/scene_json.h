@@ -21,7 +21,7 @@ Result<SceneJson> parse_scene_json(std::string_view text, const std::string& nam
 /// "a string", "an object": a JSON type as messages say it. [any]
 const char* json_type(const SceneJson& value);
 
-/// Reads one JSON object. Getters answer the fallback once something is wrong; `finish` then tells what. [build]
+/// Reads one JSON object. Getters answer the fallback once something is wrong, and `status` tells what. [build]
 class ObjectReader {
  public:
   /// `object` names an entry of the table; the structure of `json` is checked, all the way down.
