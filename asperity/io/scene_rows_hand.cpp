@@ -197,6 +197,8 @@ void change(SceneObject& row) {
   row("handover", seconds(not_negative), "Over how long a change of the scene is spread.", &S::handover);
   row("power", Type::number(not_negative),
       "W that changes may give to the hand beyond what it has spent; 0 keeps them passive.", &S::change_power);
+  row("capacity", Type::number(not_negative),
+      "J that the hand may get back later, through something else than it has put it in by.", &S::energy_capacity);
   row("level_rate", Type::number(positive), "Levels of detail a second.", &S::level_rate);
 }
 

@@ -244,6 +244,8 @@ Status check(const SceneSettings& settings) {
   if (!length(settings.handover.count()))
     return bad("handover", settings.handover.count(), "a time of 0 or more (s, ms)");
   if (!length(settings.change_power)) return bad("change_power", settings.change_power, "a power of 0 or more (W)");
+  if (!length(settings.energy_capacity))
+    return bad("energy_capacity", settings.energy_capacity, "an energy of 0 or more (J)");
   if (!(settings.level_rate > 0.0)) return bad("level_rate", settings.level_rate, "levels a second, above 0");
   return success();
 }

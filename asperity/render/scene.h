@@ -23,7 +23,8 @@ struct SceneSettings {
   /// Power (W) that moving, deforming and changing surfaces may give to the hand beyond what it has spent on them: 0,
   /// the default, keeps every change passive.
   double change_power = 0.0;
-  /// J that the hand may get back later, through something else than it has put it in by.
+  /// J that the hand may get back later, through something else than it has put it in by. What a force holds it gives
+  /// back in any case.
   double energy_capacity = EnergyAccount::default_capacity;
   /// How fast coats change their level of detail (levels a second), above 0.
   double level_rate = 8.0;

@@ -272,7 +272,7 @@ TEST(View, H_V_a_feature_vanishes_below_one_pixel_and_returns_on_zoom) {
 }
 
 // T10: a level change moves the surface under the hand; what that would give comes from the account.
-TEST(View, T10_level_changes_pay_from_the_tank) {
+TEST(View, T10_level_changes_pay_from_the_account) {
   const MeshSurface base = sheet();
   DetailSettings detail;
   detail.kind = DetailKind::low_pass;
@@ -320,6 +320,8 @@ TEST(View, Errors_name_what_is_wrong) {
   EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.view.camera.pixels = -1; }), "view.camera.pixels");
   EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.handover = Seconds(-1.0); }), "handover");
   EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.change_power = -1.0; }), "change_power");
+  EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.energy_capacity = -1.0; }), "energy_capacity");
+  EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.energy_capacity = infinity; }), "energy_capacity");
   EXPECT_EQ(error([](Instance&, SceneSettings& s) { s.level_rate = 0.0; }), "level_rate");
   EXPECT_EQ(error([](Instance& i, SceneSettings&) { i.motion.velocity.linear.x() = NAN; }), "surfaces[0].motion");
   EXPECT_EQ(error([](Instance& i, SceneSettings&) { i.material.viscosity = -1.0; }), "surfaces[0].material.viscosity");

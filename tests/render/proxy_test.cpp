@@ -310,7 +310,7 @@ TEST(ProxyBall, rests_its_radius_away_from_the_relief) {
   }
 }
 
-TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
+TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_account) {
   // Amendment 6: at a fixed probe, a change of the scene gives the hand no more than the contact has dissipated.
   const auto surface = relief_on(mesh_of(plane_grid(0.04, 0.04, 4, 4)), {tiled(wavy_map(amplitude))}, {});
   Instance soft = instance_of(surface, 0.5, 0.4);
@@ -348,6 +348,22 @@ TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_tank) {
     }
     EXPECT_LT(state.account.level(), account);
     EXPECT_NEAR(felt.wrench.force.norm(), 3.0 * stiffness * (felt.proxy - probe).norm(), 1e-9);
+  }
+  {
+    // What is dissipated is lost to an account that holds nothing.
+    SceneSettings none;
+    none.energy_capacity = 0.0;
+    const Scene poor = must(Scene::build({soft}, none));
+    const Scene harder = must(Scene::build({hard}, none));
+    ProxyState state;
+    touch(poor, state, Vec3(1e-3, 0.0, 2e-3));
+    for (int i = 0; i < 4000; ++i) touch(poor, state, probe + Vec3(5e-3 * std::sin(0.01 * i), 0.0, 0.0));
+    touch(poor, state, probe);
+    EXPECT_EQ(state.account.level(), 0.0);
+    const ForceSample felt = touch(harder, state, probe);
+    EXPECT_TRUE(felt.flags.has(TickFlag::energy_limited));
+    EXPECT_EQ(state.account.flow(Giver::change).paid, 0.0);
+    EXPECT_GT(state.account.flow(Giver::change).asked, 1e-4);
   }
 }
 

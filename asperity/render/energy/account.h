@@ -125,7 +125,8 @@ class EnergyAccount {
     const double left = put_in + 0.5 * stiffness * moved_.squaredNorm();
     double now = spring.stored ? *spring.stored : spring.least();
     if (spring.keeps) now = std::max(now, put_in);
-    if (!(now <= left) || held.softened || giver == Giver::stiffness) return hold_less(giver, held, spring, put_in, now);
+    if (!(now <= left) || held.softened || giver == Giver::stiffness)
+      return hold_less(giver, held, spring, put_in, now);
     stiffness_ += stiffness;
     fill(put_in - now);
     held = {spring.force, now, static_cast<float>(spring.stiffness), false};

@@ -190,8 +190,8 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
 
 /// Whether a contact gives anything beside its spring, or has.
 bool has_loose(const Touched& touch, const LawForce& law) noexcept {
-  return !touch.facts->printed && (touch.facts->adds_friction || law.turns || law.force != law.spring ||
-                                   touch.contact->drag.stiffness > 0.0F);
+  return !touch.facts->printed &&
+         (touch.facts->adds_friction || law.turns || law.force != law.spring || touch.contact->drag.stiffness > 0.0F);
 }
 
 /// World frame.
