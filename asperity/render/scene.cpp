@@ -403,6 +403,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
   for (const Instance& instance : scene.felt_) {
     scene.facts_.push_back(facts_of(instance));
     scene.changes_ = scene.changes_ || scene.facts_.back().changes;
+    scene.draws_ = scene.draws_ || scene.facts_.back().draws;
   }
   std::vector<std::uint32_t> order(scene.bounds_.size());
   std::iota(order.begin(), order.end(), 0U);

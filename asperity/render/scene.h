@@ -59,6 +59,8 @@ class Scene {
   [[nodiscard]] bool direct() const noexcept { return direct_; }
   /// Whether an instance moves on by itself. [servo]
   [[nodiscard]] bool moves() const noexcept { return moves_; }
+  /// Whether an instance draws the probe from outside. [servo]
+  [[nodiscard]] bool draws() const noexcept { return draws_; }
   /// What the scene's magnets give to a hand that they draw in (J): it is lent at the start, and given back by leaving
   /// them. [servo]
   [[nodiscard]] double lends() const noexcept { return lends_; }
@@ -108,6 +110,7 @@ class Scene {
   std::uint64_t epoch_ = 0;
   bool reads_volumes_ = false;
   bool moves_ = false;
+  bool draws_ = false;
   double lends_ = 0.0;
   bool changes_ = false;
   bool direct_ = true;

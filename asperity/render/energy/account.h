@@ -83,13 +83,17 @@ class EnergyAccount {
   /// By how much the forces of the last tick have changed per metre of the hand's motion, or may have (N/m).
   [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
+  /// By the hand, since the last tick (m, world).
+  [[nodiscard]] const Vec3& moved() const noexcept { return moved_; }
+
   /// Begins a tick: books what the forces that nothing holds have done since the last one. `capacity`: J. At the
   /// first one what is held is nobody's gift: the hand begins with it. [servo]
   void open(const Vec3& moved, double capacity, bool first) noexcept {
-    if (loose_ != Vec3::Zero()) {
+    if (has_loose_) {
       level_ -= loose_.dot(moved) - advanced_;
       loose_ = Vec3::Zero();
       advanced_ = 0.0;
+      has_loose_ = false;
     }
     stiffness_ = 0.0;
     first_ = first;
@@ -117,7 +121,7 @@ class EnergyAccount {
 
   /// The share that may be rendered of a force that is held: as much as the frozen force holds after the hand's motion,
   /// and as the account pays. Remembers what is rendered. [servo]
-  double hold(Giver giver, HeldForce& held, const Spring& spring) noexcept {
+  [[gnu::always_inline]] double hold(Giver giver, HeldForce& held, const Spring& spring) noexcept {
     // What the hand has really put in, and what the force, held still over the tick, gave too much or took too little
     // of it.
     const double put_in = held.energy - held.force.dot(moved_);
@@ -166,7 +170,7 @@ class EnergyAccount {
       level_ -= paid;
       advanced_ += paid;
     }
-    loose_ += share * force;
+    take(share * force);
     return share;
   }
   /// The same for a force of which nobody knows whether it takes: wherever a hand goes that moves by at most `way` (m).
@@ -180,11 +184,14 @@ class EnergyAccount {
     flow.paid += share * given;
     level_ -= share * given;
     advanced_ += share * given;
-    loose_ += share * force;
+    take(share * force);
     return share;
   }
   /// A force that only ever takes: nothing is asked of it. [servo]
-  void take(const Vec3& force) noexcept { loose_ += force; }
+  void take(const Vec3& force) noexcept {
+    loose_ += force;
+    has_loose_ = true;
+  }
 
  private:
   /// What is left of `hold` where it is not plain that all of the force may be rendered.
@@ -241,6 +248,7 @@ class EnergyAccount {
   double level_ = 0.0;
   double capacity_ = default_capacity;
   bool first_ = false;
+  bool has_loose_ = false;
   Vec3 moved_ = Vec3::Zero();  ///< m, world: by the hand, since the last tick
   Vec3 loose_ = Vec3::Zero();  ///< N, world: rendered at the last tick, held by nothing
   double advanced_ = 0.0;      ///< J, paid for that

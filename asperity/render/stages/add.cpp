@@ -220,40 +220,48 @@ void settle_law(Tick& tick, const Touched& touch, const Material& material, LawF
   if (has_loose(touch, law)) settle_loose(tick, touch, law);
 }
 
+/// What makes the proxy's spring hold more than was put into it.
+Giver cause_of_spring(const Tick& tick, const Part& strongest, float before, float now) noexcept {
+  if (!tick.changed && !tick.surfaces_moved) return before > 0.0F && now != before ? Giver::stiffness : Giver::spring;
+  Giver cause = cause_of(tick, *strongest.touch, before, now);
+  for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
+  return cause;
+}
+
+double stiffness_of(const Part& part) noexcept {
+  return part.law.stiffness > 0.0 ? part.law.stiffness : part.stiffness;
+}
+
 /// Pays for what the proxy's parts hold together; answers the share that is rendered.
 double settle_spring(Tick& tick) noexcept {
-  EnergyAccount& account = tick.state.account;
-  HeldForce& held = tick.state.spring;
-  const Part* strongest = nullptr;
-  Spring spring;
-  for (const Part& part : tick.parts) {
+  ProxyState& state = tick.state;
+  const Part* strongest = &tick.parts[0];
+  Spring spring{strongest->law.spring, strongest->law.contact ? stiffness_of(*strongest) : 0.0, strongest->law.stored};
+  for (std::size_t i = 1; i < tick.parts.size(); ++i) {
+    const Part& part = tick.parts[i];
     if (!part.law.contact) continue;
-    const double own = part.law.stiffness > 0.0 ? part.law.stiffness : part.stiffness;
-    if (own > spring.stiffness) {
-      strongest = &part;
-      spring.stiffness = own;
-    }
     spring.force += part.law.spring;
+    spring.stored.reset();
+    if (stiffness_of(part) <= spring.stiffness) continue;
+    strongest = &part;
+    spring.stiffness = stiffness_of(part);
   }
-  if (strongest == nullptr) {
-    tick.state.stiffness = 0.0F;
-    account.release(held);
+  if (!(spring.stiffness > 0.0)) {
+    state.stiffness = 0.0F;
+    state.account.release(state.spring);
     return 1.0;
   }
   const auto local = static_cast<float>(strongest->stiffness);
-  const float before = std::exchange(tick.state.stiffness, local);
-  Giver cause = before > 0.0F && local != before ? Giver::stiffness : Giver::spring;
-  if (tick.changed || tick.surfaces_moved) {
-    cause = cause_of(tick, *strongest->touch, before, local);
-    for (const Part& part : tick.parts) cause = part.touch->moved && !tick.changed ? Giver::motion : cause;
-  }
-  if (tick.parts.size() == 1) spring.stored = strongest->law.stored;
-  return account.hold(cause, held, spring);
+  const float before = std::exchange(state.stiffness, local);
+  return state.account.hold(cause_of_spring(tick, *strongest, before, local), state.spring, spring);
 }
 
 /// Pays for the proxy, and then for the rest of each part.
 void settle_parts(Tick& tick) noexcept {
-  if (tick.parts.empty() && tick.state.spring.stiffness == 0.0F) return;
+  if (tick.parts.empty()) {
+    tick.state.stiffness = 0.0F;
+    return tick.state.account.release(tick.state.spring);
+  }
   const double share = settle_spring(tick);
   for (Part& part : tick.parts) {
     if (share != 1.0) soften(tick, share, part.law);
@@ -365,8 +373,11 @@ void add_effects(Tick& tick) noexcept {
 
 void add(Tick& tick) noexcept {
   Vec3 shadow = tick.felt;
-  for (Touched& touch : tick.touches) {
-    if (!touch.facts->constrains) add_law(tick, touch, shadow);
+  // A part of the proxy stands for each that constrains it.
+  if (tick.parts.size() < tick.touches.size()) {
+    for (Touched& touch : tick.touches) {
+      if (!touch.facts->constrains) add_law(tick, touch, shadow);
+    }
   }
   for (Part& part : tick.parts) add_to_proxy(tick, part);
   settle_parts(tick);
@@ -375,8 +386,10 @@ void add(Tick& tick) noexcept {
     part.touch->contact->touching = part.law.contact;
   }
   tick.out.proxy = tick.parts.empty() ? shadow : tick.felt;
-  for (Touched& touch : tick.touches) {
-    if (touch.facts->draws) add_attraction(tick, touch);
+  if (tick.scene.draws()) {
+    for (Touched& touch : tick.touches) {
+      if (touch.facts->draws) add_attraction(tick, touch);
+    }
   }
   if (!tick.scene.felt_effects().empty()) add_effects(tick);
 }

@@ -22,7 +22,7 @@ Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
     return force;
   }
   // The hand moves as it did or is told to, or twice as far.
-  const double way = 2.0 * std::max(tick.moved.norm(), tick.ahead().norm()) + 1e-7;
+  const double way = 2.0 * std::max(state.account.moved().norm(), tick.ahead().norm()) + 1e-7;
   state.residual *= state.account.spend_anywhere(Giver::handover, state.residual, way);
   return force + state.residual;
 }

@@ -111,8 +111,8 @@ bool sample(Tick& tick) noexcept {
   }
   tick.changed = state.epoch != tick.scene.epoch();
   if (tick.changed && !tick.first) adopt_view(view, tick);
-  tick.moved = tick.probe->pose.position - state.previous_probe;
-  state.account.open(tick.moved, tick.scene.settings().energy_capacity, tick.first);
+  state.account.open(tick.probe->pose.position - state.previous_probe, tick.scene.settings().energy_capacity,
+                     tick.first);
   if (tick.changed) {
     for (std::size_t i = state.contacts.size(); i-- > 0;) {
       Contact& contact = state.contacts[i];

@@ -36,7 +36,6 @@ struct Tick {
   bool direct = true;                     ///< the scene is the workspace
   bool first = false;                     ///< of the state
   bool changed = false;                   ///< another scene than at the last tick
-  Vec3 moved = Vec3::Zero();              ///< m, in the scene: the probe since the last tick
 
   // reach
   FixedVector<Touched, most_contacts> touches;
