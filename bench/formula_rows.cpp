@@ -2,7 +2,6 @@
 #include <utility>
 #include <vector>
 
-#include "asperity/render/step.h"
 #include "asperity/surface/custom/surface.h"
 #include "asperity/surface/parametric/surface.h"
 #include "bench/rows.h"
@@ -38,16 +37,7 @@ Result<Row> formula_row(const std::string& name, const Surface& surface, const s
   sphere.sides = Sides::front;
   sphere.material.static_friction = 1.5 * friction;
   sphere.material.dynamic_friction = friction;
-  ASPERITY_TRY(Scene scene, Scene::build({sphere}, 0.0));
-  ProxyState state;
-  ProxyCache cache;
-  ProbeSample probe;
-  probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(scene, state, cache, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
-    probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
-  });
+  return sliding_row(name, {sphere}, slide);
 }
 
 }  // namespace

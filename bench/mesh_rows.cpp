@@ -4,7 +4,6 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
-#include "asperity/render/step.h"
 #include "bench/embree_peer.h"
 #include "bench/rows.h"
 #include "bench/slide.h"
@@ -56,16 +55,7 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const MeshSu
   }
   std::vector<Instance> instances{sphere};
   ASPERITY_CHECK(add_others(touch.others, instances));
-  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), touch.radius));
-  ProxyState state;
-  ProxyCache cache;
-  ProbeSample probe;
-  probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(scene, state, cache, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, touch, state, cache, probe](std::size_t tick) mutable {
-    probe.pose.position = slide->probe(touch.resting ? 0 : tick, touch.radius);
-    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
-  });
+  return sliding_row(name, std::move(instances), slide, {touch.radius, touch.resting});
 }
 
 Row closest_row(const std::shared_ptr<const MeshSurface>& surface, const std::shared_ptr<const Slide>& slide) {

@@ -5,7 +5,6 @@
 
 #include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
-#include "asperity/render/step.h"
 #include "bench/rows.h"
 #include "bench/slide.h"
 
@@ -74,16 +73,7 @@ Result<Row> step_row(const std::string& name, const SharedRelief& surface, const
   sphere.sides = Sides::front;
   sphere.material.static_friction = 0.3;
   sphere.material.dynamic_friction = 0.2;
-  ASPERITY_TRY(Scene scene, Scene::build({sphere}, 0.0));
-  ProxyState state;
-  ProxyCache cache;
-  ProbeSample probe;
-  probe.pose.position = 1.5 * sphere_radius * slide->direction.front();
-  step(scene, state, cache, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
-    probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
-  });
+  return sliding_row(name, {sphere}, slide);
 }
 
 /// A slide through these directions, the probe under the facets.

@@ -1,6 +1,9 @@
 #include "bench/slide.h"
 
 #include <cmath>
+#include <utility>
+
+#include "asperity/render/step.h"
 
 namespace asperity::bench {
 
@@ -32,6 +35,20 @@ Slide make_slide(const TriangleIndex& index, std::size_t ticks) {
     slide.surface.push_back(hit.face != no_index ? 2.0 * sphere_radius * (1.0 - hit.t) : sphere_radius);
   }
   return slide;
+}
+
+Result<Row> sliding_row(const std::string& name, std::vector<Instance> instances, std::shared_ptr<const Slide> slide,
+                        const Led& led) {
+  ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), led.radius));
+  ProxyState state;
+  ProxyCache cache;
+  ProbeSample probe;
+  probe.pose.position = led.start * slide->direction.front();
+  step(scene, state, cache, probe, Seconds(tick_seconds));
+  return Row(name, [scene = std::move(scene), slide, led, state, cache, probe](std::size_t tick) mutable {
+    probe.pose.position = slide->probe(led.resting ? 0 : tick, led.radius);
+    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
+  });
 }
 
 }  // namespace asperity::bench

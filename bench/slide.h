@@ -1,8 +1,12 @@
 #pragma once
 
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "asperity/geometry/triangle_index.h"
+#include "asperity/render/scene.h"
+#include "bench/measure.h"
 
 namespace asperity::bench {
 
@@ -28,5 +32,15 @@ std::vector<Vec3> wandering_directions(std::size_t ticks);
 
 /// Errors: none; a mesh that a ray from the centre misses counts as 50 mm away there. [build]
 Slide make_slide(const TriangleIndex& index, std::size_t ticks);
+
+/// How a probe is led along a slide.
+struct Led {
+  double radius = 0.0;                 ///< m, of the probe
+  bool resting = false;                ///< at the first place all the time
+  double start = 1.5 * sphere_radius;  ///< m, from the centre: where it is before
+};
+/// A row that takes a probe through `step`; a tick counts where something is touched. Errors: of the scene. [build]
+Result<Row> sliding_row(const std::string& name, std::vector<Instance> instances, std::shared_ptr<const Slide> slide,
+                        const Led& led = {});
 
 }  // namespace asperity::bench

@@ -2,7 +2,6 @@
 #include <memory>
 #include <random>
 
-#include "asperity/render/step.h"
 #include "bench/rows.h"
 #include "bench/slide.h"
 
@@ -43,16 +42,7 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Scalar
     instance.material.static_friction = 0.3;
     instance.material.dynamic_friction = 0.2;
   }
-  ASPERITY_TRY(Scene scene, Scene::build({instance}, 0.0));
-  ProxyState state;
-  ProxyCache cache;
-  ProbeSample probe;
-  probe.pose.position = 1.1 * sphere_radius * slide->direction.front();
-  step(scene, state, cache, probe, Seconds(tick_seconds));
-  return Row(name, [scene = std::move(scene), slide, state, cache, probe](std::size_t tick) mutable {
-    probe.pose.position = slide->probe(tick, 0.0);
-    return step(scene, state, cache, probe, Seconds(tick_seconds)).flags.has(TickFlag::contact);
-  });
+  return sliding_row(name, {instance}, slide, {.start = 1.1 * sphere_radius});
 }
 
 /// The wandering slide of the meshes, on the sphere itself.
