@@ -71,6 +71,7 @@
 #include "asperity/material/material.h"
 
 // surface: what is touched
+#include "asperity/surface/blend_option.h"
 #include "asperity/surface/coat.h"
 #include "asperity/surface/custom/surface.h"
 #include "asperity/surface/custom/view.h"
@@ -102,19 +103,34 @@
 #include "asperity/surface/walk.h"
 
 // render: laws, scene, step
-#include "asperity/render/custom_law.h"
 #include "asperity/render/energy/account.h"
 #include "asperity/render/felt.h"
 #include "asperity/render/field_effects.h"
 #include "asperity/render/fine/features.h"
 #include "asperity/render/fine/texture.h"
 #include "asperity/render/instance.h"
+#include "asperity/render/law.h"
+#include "asperity/render/law_facts.h"
 #include "asperity/render/law_registry.h"
 #include "asperity/render/laws.h"
+#include "asperity/render/laws/avila.h"
+#include "asperity/render/laws/contact_point_state.h"
+#include "asperity/render/laws/cross_uncross.h"
+#include "asperity/render/laws/dense_mesh.h"
+#include "asperity/render/laws/force_shading.h"
+#include "asperity/render/laws/generated_geometry.h"
+#include "asperity/render/laws/god_object.h"
+#include "asperity/render/laws/height_field.h"
+#include "asperity/render/laws/magnetic.h"
+#include "asperity/render/laws/mesostructure.h"
+#include "asperity/render/laws/normal_perturbation.h"
+#include "asperity/render/laws/proxy.h"
+#include "asperity/render/laws/virtual_contact_point.h"
 #include "asperity/render/local_material.h"
 #include "asperity/render/scene.h"
 #include "asperity/render/state.h"
 #include "asperity/render/step.h"
+#include "asperity/render/touched_surface.h"
 #include "asperity/render/view.h"
 
 // device: where the probe is

@@ -38,7 +38,7 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Scalar
   instance.surface = std::make_shared<const IsoSurface>(std::move(surface));
   instance.law = law;
   instance.sides = Sides::front;
-  if (std::holds_alternative<ProxyLaw>(law)) {
+  if (law.is<ProxyLaw>()) {
     instance.material.static_friction = 0.3;
     instance.material.dynamic_friction = 0.2;
   }

@@ -6,7 +6,7 @@ set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/asperity")
 
 # Not the modules' own headers, nor those of the parts that are not installed as libraries.
 install(DIRECTORY asperity DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h"
-  PATTERN detail EXCLUDE PATTERN render/contact EXCLUDE PATTERN render/laws EXCLUDE PATTERN render/stages EXCLUDE
+  PATTERN detail EXCLUDE PATTERN render/contact EXCLUDE PATTERN render/stages EXCLUDE
   PATTERN io/vdb EXCLUDE PATTERN io/vtk EXCLUDE PATTERN study/nlopt EXCLUDE)
 install(EXPORT asperityTargets NAMESPACE asperity:: DESTINATION "${package_folder}")
 

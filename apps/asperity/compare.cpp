@@ -12,6 +12,7 @@
 #include "apps/asperity/scene_argument.h"
 #include "asperity/io/atomic_file.h"
 #include "asperity/io/trace_file.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity::program {
 namespace {
@@ -225,6 +226,17 @@ Json detection_json(const std::vector<DetectionRow>& rows) {
   return list;
 }
 
+/// What each law says of itself, once a kind, beside what the scene's own say there already.
+void add_law_facts(const std::vector<Rival>& rivals, std::vector<ReportFact>& facts) {
+  for (const Rival& rival : rivals) {
+    const Result<Law> law = law_by_name(rival.law);
+    if (!law) continue;
+    const std::string text = law_fact(law->kind());
+    const bool told = std::any_of(facts.begin(), facts.end(), [&](const ReportFact& one) { return one.value == text; });
+    if (!told) facts.push_back({fmt::format("law \"{}\"", law->facts().name), text});
+  }
+}
+
 Result<int> compare(const CompareOptions& options, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress, !options.one_way));
@@ -263,6 +275,7 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     CompareReport report;
     report.origin = report_origin(experiment, console);
     report.setup = setup_facts(experiment);
+    add_law_facts(rivals, report.setup);
     for (const Column& column : columns) report.entries.push_back(column.entry);
     report.loop_rates = rates;
     report.detection = detection;
@@ -312,6 +325,7 @@ void add_compare(Arguments& program, Console& console, Action& action) {
   command.flag("--no-report", options->no_report, "Numbers only: no picture, no page");
   add_console_options(command, console);
   command.closing_words(
+      words_of_laws() +
       "direction: mean angle between the force and the relief's normal. height: RMS of followed height against the "
       "true relief, of what was\n"
       "met. jump: largest change of force within a tick. energy/loop: positive is energy fed into the hand. update: "

@@ -59,7 +59,7 @@ void potential_lines(const ImplicitSurface& surface, const Instance& instance, d
       fmt::format("edges are rounded within about {}; texture is felt to its full height from waves of {} on "
                   "(6 voxels)",
                   format_length(1.5 * voxel), format_length(6.0 * voxel)));
-  if (constrains(instance.law)) return;
+  if (instance.law.constrains()) return;
   const double depth = force / instance.material.stiffness;
   if (depth > surface.trusted_depth()) {
     lines.push_back(

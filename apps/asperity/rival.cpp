@@ -83,9 +83,11 @@ Result<bool> change(Instance& instance, const std::string& word) {
     return true;
   }
   if (stem == "neighbours") {
-    auto* law = std::get_if<MesostructureLaw>(&instance.law);
+    const auto* law = instance.law.as<MesostructureLaw>();
     if (law == nullptr || law->formulation != Formulation::literal) return false;
-    law->test_neighbours = true;
+    MesostructureLaw neighbours = *law;
+    neighbours.test_neighbours = true;
+    instance.law = neighbours;
     return true;
   }
   const Formulation as = formulation;
@@ -218,8 +220,30 @@ Result<Experiment> felt_by(const Experiment& experiment, const Rival& rival) {
   return felt;
 }
 
+/// By what laws say of themselves; where the instance's own is not among those, that and the proxy.
+std::vector<std::string> laws_compared_on(const Instance& instance) {
+  constexpr unsigned surfaces[] = {on_mesh, on_relief, on_iso, on_implicit, 0, 0};
+  std::vector<std::string> names;
+  const auto add = [&](const LawKind& kind, bool literal_form) {
+    names.emplace_back(kind.facts->name);
+    if (literal_form && kind.form != nullptr) names.push_back(law_name(Law(kind).in_form(Formulation::literal)));
+  };
+  const LawKind& own = instance.law.kind();
+  const unsigned here = surfaces[instance.surface.index()];
+  if ((own.facts->compared & here) == 0 && own.facts->proxy != LawProxy::surface) {
+    add(own, true);
+    names.emplace_back("proxy");
+    return names;
+  }
+  for (const LawKind* kind : law_kinds()) {
+    if ((kind->facts->compared & here) != 0) add(*kind, (kind->facts->compared & literal_too) != 0);
+  }
+  if (names.empty()) names.emplace_back("proxy");
+  return names;
+}
+
 std::vector<std::string> default_rivals(const Scene& scene) {
-  if (followed_instance(scene) != nullptr) return {"avila", "cross-uncross", "proxy"};
+  if (const Instance* followed = followed_instance(scene)) return laws_compared_on(*followed);
   for (const Instance& instance : scene.instances()) {
     const std::string law = law_name(instance.law);
     if (instance.closed_from != nullptr)
@@ -231,21 +255,14 @@ std::vector<std::string> default_rivals(const Scene& scene) {
       return {law + "+implicit-coulomb",  law + "+karnopp", law + "+karnopp-literal", law + "+dahl",
               law + "+hayward-armstrong", law + "+lugre",   law + "+coulomb"};
     }
-    if (custom_of(instance.law) != nullptr) return {law, "proxy"};
-    if (parametric_of(instance.surface) != nullptr || custom_of(instance.surface) != nullptr) return {"proxy"};
-    if (std::holds_alternative<MagneticLaw>(instance.law)) return {"magnetic", "magnetic-literal", "proxy"};
-    if (const ImplicitSurface* implicit = implicit_of(instance.surface)) {
-      if (implicit->mesh() == nullptr)
-        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "avila"};
-      if (implicit->textured())
-        return {"proxy", "virtual-contact-point", "virtual-contact-point-literal", "normal-perturbation"};
-      return {
-          "mesh/proxy", "mesh/force-shading-literal", "proxy", "virtual-contact-point", "virtual-contact-point-literal",
-          "avila"};
-    }
-    if (instance.surface.index() == 0) return {"proxy", "god-object", "force-shading"};
+    const std::vector<std::string> laws = laws_compared_on(instance);
+    const ImplicitSurface* implicit = implicit_of(instance.surface);
+    if (implicit == nullptr || implicit->mesh() == nullptr || implicit->textured()) return laws;
+    std::vector<std::string> all{"mesh/proxy", "mesh/force-shading-literal"};
+    all.insert(all.end(), laws.begin(), laws.end());
+    return all;
   }
-  return {"proxy", "mesostructure", "height-field", "force-shading"};
+  return {"proxy"};
 }
 
 std::vector<std::string> suitable_rivals(const Experiment& experiment) {

@@ -177,12 +177,24 @@ std::string law_names_of(const Scene& scene) {
   return names;
 }
 
+std::string law_fact(const LawKind& kind) {
+  return fmt::format("{}: {} ({})", kind.facts->name, kind.facts->title, kind.facts->source);
+}
+
+std::string words_of_laws() {
+  std::string words = "Laws; -literal behind those marked with *: as printed, its errata included\n";
+  for (const LawKind* kind : law_kinds())
+    words += fmt::format("{} {}\n", kind->form != nullptr ? " *" : "  ", law_fact(*kind));
+  return words;
+}
+
 std::vector<ReportFact> setup_facts(const Experiment& experiment) {
   std::vector<ReportFact> facts;
   for (const Instance& instance : experiment.scene.instances()) {
     facts.push_back({fmt::format("surface \"{}\"", instance.name), surface_fact(instance)});
     facts.push_back({fmt::format("law, stiffness of \"{}\"", instance.name),
                      fmt::format("{}, {:.3g} N/mm", law_name(instance.law), instance.material.stiffness * 1e-3)});
+    facts.push_back({fmt::format("by law \"{}\"", instance.law.facts().name), law_fact(instance.law.kind())});
   }
   for (const FieldEffect& effect : experiment.scene.effects()) {
     facts.push_back({fmt::format("effect \"{}\"", effect.name),

@@ -33,6 +33,11 @@ Result<RunResult> run_experiment(const Experiment& experiment, const std::functi
 
 /// The laws of a scene, joined: "mesostructure". [any]
 std::string law_names_of(const Scene& scene);
+/// What a law says of itself: "avila: a layer that pushes by the field's value at the probe (large-data-2008, M1 ...)".
+/// [any]
+std::string law_fact(const LawKind& kind);
+/// That of every law that there is, a line each, for help. [any]
+std::string words_of_laws();
 /// Device, probe, surfaces and stroke as a report lists them. [any]
 std::vector<ReportFact> setup_facts(const Experiment& experiment);
 /// Where a report comes from: command, machine, date, program. [main]

@@ -190,14 +190,14 @@ void add_touch(Arguments& program, Console& console, Action& action) {
   add_scene_options(command, options->scene);
   command
       .option("--law", options->scene.law,
-              "Of every surface: proxy, god-object, force-shading, height-field, mesostructure, generated-geometry, "
-              "dense-mesh; with --implicit proxy, virtual-contact-point, magnetic, avila; -literal as printed")
+              "Of every surface: see below, or asperity schema law for what each can be told")
       .group("Touch");
   command.option("--out", options->out, "Folder of the outputs; default out/SCENE");
   command.flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
   command.flag("--csv", options->csv, "The trace as a table as well (trace.csv, trace.json)");
   add_console_options(command, console);
   command.closing_words(
+      words_of_laws() +
       "A mesh alone, or a mesh and a map, is a scene: the mesh is fitted to the device's workspace, the map is laid on "
       "it.\n"
       "Examples:\n"

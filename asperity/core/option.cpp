@@ -15,6 +15,23 @@ std::string Range::text() const {
   return "of any size";
 }
 
+int Option::zoom_power() const {
+  if (zooms) return *zooms;
+  switch (type.kind == OptionKind::quantity ? type.dimension : Dimension::ratio) {
+    case Dimension::force: return 1;
+    case Dimension::stiffness:
+    case Dimension::damping:
+    case Dimension::mass: return 2;
+    case Dimension::speed: return -1;
+    case Dimension::length:
+    case Dimension::time:
+    case Dimension::frequency:
+    case Dimension::ratio:
+    case Dimension::angle: break;
+  }
+  return 0;
+}
+
 bool OptionType::takes(const OptionValue& value) const {
   if (const auto* number = std::get_if<double>(&value)) return kind == OptionKind::any || range.holds(*number);
   if (const auto* number = std::get_if<std::int64_t>(&value)) return range.holds(static_cast<double>(*number));

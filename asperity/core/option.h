@@ -230,6 +230,8 @@ struct Option {
   std::vector<OptionTest> only = {};        ///< it is read where all of these hold
   std::optional<OptionTest> required = {};  ///< it has to be there where this holds
   std::string contents = {};                ///< what is refused of it by contents or files alone; no schema tells that
+  std::string printed = {};                 ///< of a law's literal form alone: why the consistent one does not read it
+  std::optional<int> zooms = {};            ///< see zoom_power
   std::type_index settings = typeid(void);  ///< what it is a member of
   std::function<OptionValue(const void*)> get = {};
   std::function<void(void*, const OptionValue&)> set = {};
@@ -247,6 +249,21 @@ struct Option {
     test.why = std::move(why);
     return only.push_back(std::move(test)), *this;
   }
+  Option& or_else(std::string words) { return otherwise = std::move(words), *this; }
+  Option& by_contents(std::string what) { return contents = std::move(what), *this; }
+  Option& of_printed_form(std::string why) { return printed = std::move(why), *this; }
+  Option& zooming(int power) { return zooms = power, *this; }
+  /// The power of a view's zoom that a number grows by in the scene that is shown, where lengths are that much shorter
+  /// than the hand's, and energies and times are the same: forces by the first, stiffnesses and dampings by the second,
+  /// speeds by less. A length is the scene's own and stays, unless it is said to be the hand's. [any]
+  [[nodiscard]] int zoom_power() const;
 };
+
+/// A row bound to a member. [any]
+template <class S, class T>
+Option option(std::string key, T S::*member, OptionType type, std::string help) {
+  Option row{std::move(key), std::move(type), std::move(help)};
+  return row.of(member);
+}
 
 }  // namespace asperity

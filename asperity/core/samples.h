@@ -34,7 +34,7 @@ enum class TickFlag : std::uint32_t {
   contacts_dropped =
       1u << 7,  ///< more instances within reach than a probe can hold at once; the farther ones are not felt
   energy_limited =
-      1u << 8,  ///< the contact's spring would have gained energy from a change of the scene, and was softened
+      1u << 8,  ///< a force would have given more energy than the hand has put in, and less of it was rendered
   coarse_data = 1u << 9,     ///< part of a volume was not in memory yet and was felt from a coarser level
   field_force = 1u << 10,    ///< a volume without a surface pushes
   texture_faded = 1u << 11,  ///< a texture is finer than speed or device can render, and was felt weaker

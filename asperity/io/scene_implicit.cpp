@@ -10,6 +10,7 @@
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/render/law_registry.h"
+#include "asperity/render/laws/magnetic.h"
 #include "asperity/surface/implicit/texture.h"
 
 namespace asperity {
@@ -25,10 +26,7 @@ Reach reach_of(const ImplicitFeel& feel, const DeviceProfile& device) {
   Reach reach;
   // The proxy needs the surface's neighbourhood alone; but what is compared is one potential under several laws.
   reach.outside = MagneticLaw{}.band;
-  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&feel.law))
-    reach.outside = std::max(reach.outside, contact->offset);
-  if (const auto* magnetic = std::get_if<MagneticLaw>(&feel.law))
-    reach.outside = std::max(reach.outside, magnetic->band);
+  reach.outside = std::max(reach.outside, feel.law.outside().distance);
   // Laws without a proxy read the potential where the probe is: half as deep again as the device's force presses it in.
   constexpr double margin = 1.5;
   reach.inside = margin * device.max_force / feel.material.stiffness;
@@ -211,7 +209,7 @@ class ImplicitReader {
 
   /// What the law will not feel of it.
   void note_limits(const ImplicitSurface& surface, Sides sides) {
-    if (constrains(feel_.law)) return;
+    if (feel_.law.constrains()) return;
     const double depth = context_.device.max_force / feel_.material.stiffness;
     if (surface.trusted_depth() < depth) {
       note(

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "asperity/io/detail/scene_custom.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/image_io.h"
 #include "asperity/render/law_registry.h"
+#include "asperity/surface/blend_option.h"
 
 namespace asperity {
 namespace {
@@ -36,23 +36,23 @@ Result<std::vector<double>> read_blend_map(const SceneJson& json, const std::str
   return means;
 }
 
-/// A blend that is an image; by its name or as weights it is bound to the settings.
-Status read_blend(ObjectReader& reader, const SceneContext& context, Blend& kind, std::vector<double>& weights) {
-  const SceneJson* blend = reader.raw("blend");
+/// What a row holds whose value is a blend that is an image: its weights. By its name or as weights it is bound to the
+/// settings already.
+Status read_blend(ObjectReader& reader, const SceneContext& context, const Option& row, void* settings) {
+  const SceneJson* blend = reader.raw(row.key);
   if (blend == nullptr || !blend->is_object()) return reader.status();
-  ASPERITY_TRY(weights, read_blend_map(*blend, reader.place_of("blend"), context, reader));
-  kind = Blend::image;
+  ASPERITY_TRY(std::vector<double> weights, read_blend_map(*blend, reader.place_of(row.key), context, reader));
+  row.set(settings, std::move(weights));
   return reader.status();
 }
 
 }  // namespace
 
 SceneJson law_json(const Law& law) {
-  if (const CustomLaw* custom = custom_of(law)) return named_numbers_json(custom->name(), custom->numbers());
   SceneJson json = SceneJson::object();
-  json["type"] = law_name(in_formulation(law, Formulation::consistent));
-  if (const std::optional<Formulation> form = formulation_of(law)) json["formulation"] = to_string(*form);
-  std::visit([&](const auto& one) { write_settings(json, scene_object("law"), one); }, law);
+  json["type"] = law.facts().name;
+  if (const std::optional<Formulation> form = law.formulation()) json["formulation"] = to_string(*form);
+  write_bound(json, scene_object("law"), *law.kind().type, law.settings());
   return json;
 }
 
@@ -64,28 +64,24 @@ Result<ScenePart<Law>> read_law(const SceneJson& json, const std::string& place,
   if (!json.is_object()) {
     return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, "a law's name or an object");
   }
-  if (json.contains("type") && json["type"].is_string()) {
-    // Its numbers are its own, and so is what is said of them.
-    const std::string name = json["type"].get<std::string>();
-    const std::vector<std::string>& own = custom_law_names();
-    if (std::find(own.begin(), own.end(), name) != own.end()) {
-      ASPERITY_TRY(NamedNumbers numbers, read_named_numbers(json, place));
-      ASPERITY_TRY(const Law law, at_place(make_custom_law(name, std::move(numbers)), place));
-      return ScenePart<Law>{law, law_json(law)};
-    }
-    // Before its keys: of a law that nobody knows they say nothing.
-    ASPERITY_CHECK(at_place(law_by_name(name), place + ".type"));
-  }
+  // Before its keys: of a law that nobody knows they say nothing.
+  if (json.contains("type") && json["type"].is_string())
+    ASPERITY_CHECK(at_place(law_by_name(json["type"].get<std::string>()), place + ".type"));
   ObjectReader reader(json, place, "law");
   const auto type = reader.get<std::string>("type");
   ASPERITY_CHECK(reader.status());
-  ASPERITY_TRY(Law law, at_place(law_by_name(type), place + ".type"));
+  ASPERITY_TRY(Law named, at_place(law_by_name(type), place + ".type"));
   // Told by "formulation" or by a name that ends in "-literal", a form has the same options by default.
-  if (const std::optional<Formulation> named = formulation_of(law))
-    law = in_formulation(law, reader.get("formulation", *named));
-  std::visit([&](auto& one) { reader.read_all(one); }, law);
-  if (auto* meso = std::get_if<MesostructureLaw>(&law))
-    ASPERITY_CHECK(read_blend(reader, context, meso->blend, meso->blend_map));
+  if (const std::optional<Formulation> form = named.formulation())
+    named = named.in_form(reader.get("formulation", *form));
+  Status read = success();
+  const Law law = named.changed([&](void* settings) {
+    reader.read_bound(*named.kind().type, settings);
+    for (const Option& row : law_options(named.kind())) {
+      if (read && reader.reads(row.key)) read = read_blend(reader, context, row, settings);
+    }
+  });
+  ASPERITY_CHECK(read);
   ASPERITY_CHECK(reader.status());
   ASPERITY_CHECK(at_place(validate(law), place));
   return ScenePart<Law>{law, law_json(law)};
@@ -96,7 +92,7 @@ Result<Stitching> read_stitching(const SceneJson& json, const std::string& place
   ObjectReader reader(json, place, "stitching");
   Stitching stitching;
   reader.read_all(stitching);
-  ASPERITY_CHECK(read_blend(reader, context, stitching.blend, stitching.blend_map));
+  ASPERITY_CHECK(read_blend(reader, context, blend_option(&Stitching::blend, &Stitching::blend_map), &stitching));
   ASPERITY_CHECK(at_place(validate(stitching), place));
   coat.take("stitching", std::move(reader));
   return stitching;

@@ -4,6 +4,7 @@
 #include "asperity/field/mesostructure/library.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/detail/scene_rows.h"
+#include "asperity/surface/blend_option.h"
 #include "asperity/surface/relief/closing.h"
 
 namespace asperity::scene_rows {
@@ -183,7 +184,7 @@ void stitching(SceneObject& row) {
       &S::rho);
   row("fillet_radius", length(positive), "Of the ball.", &S::fillet_radius,
       only_if(Test::is("folds", {"fillet"}), "without \"folds\": \"fillet\""));
-  row("blend", blend_type(), blend_help, bound_blend(&S::blend, &S::blend_map));
+  row.rows.push_back(blend_option(&S::blend, &S::blend_map));
 }
 
 void blend_map(SceneObject& row) {
@@ -317,12 +318,6 @@ void heights(SceneObject& row, bool shares, const std::function<void(Option&)>& 
 Type heights_source() {
   return Type::any({Type::file(), Type::object("height generator"), Type::object("library relief")})
       .saying("an image file (PNG, JPEG, EXR) or an object with a generator or a name of the library");
-}
-
-Type blend_type() {
-  const Type weights = Type::array(Type::number({0.0, 1.0}), 2, 1000000, "weights");
-  return Type::any({Type::named<Blend>(), Type::object("blend map"),
-                    Type(weights).saying("an array of two weights or more, each from 0 to 1")});
 }
 
 Rows coat_rows() {

@@ -1,5 +1,7 @@
 // Rows of the table of scene keys: laws, materials and fine features.
 
+#include <fmt/format.h>
+
 #include "asperity/io/detail/scene_fine.h"
 #include "asperity/io/detail/scene_reader.h"
 #include "asperity/io/detail/scene_rows.h"
@@ -8,87 +10,34 @@
 namespace asperity::scene_rows {
 namespace {
 
-/// The names of laws, each with that of its literal form.
-Test by_law(const std::vector<std::string>& laws) {
-  std::vector<std::string> names;
-  for (const std::string& law : laws) names.insert(names.end(), {law, law + "-literal"});
-  return Test::is("type", std::move(names));
-}
-
-/// The literal form is told by "formulation", or by the name.
-Test literal(const std::string& law) {
-  return Test::any({Test::all({Test::given("formulation"), Test::is("formulation", {"literal"})}),
-                    Test::all({Test::without("formulation"), Test::is("type", {law + "-literal"})})});
-}
-
 void law(SceneObject& row) {
   const char* by = "by the law \"{}\"";
   std::vector<std::string> two_forms;
-  for (const std::string& name : law_names()) {
-    if (formulation_of(law_by_name(name).value())) two_forms.push_back(name);
+  std::string what;
+  for (const LawKind* kind : law_kinds()) {
+    const LawFacts& facts = *kind->facts;
+    what += fmt::format("{}{}: {} ({})", what.empty() ? "" : "; ", facts.name, facts.title, facts.source);
+    if (kind->form == nullptr) continue;
+    for (const char* form : {"", "-literal"}) two_forms.push_back(std::string(facts.name) + form);
   }
-  const char* meso = "by the consistent mesostructure law: the coat's \"stitching\" says how it blends";
-  const char* contact = "by the consistent law \"virtual-contact-point\", which has one magnitude";
-  const char* crossed = "by the consistent law \"cross-uncross\", which looks as far as it has to";
-  row("type", Type::one_of(law_names()),
-      "god-object and force-shading touch the geometry; height-field (haptic-textures-2005, 3.3) and mesostructure "
-      "(hrm-2010, Algorithm 2) the coat; generated-geometry and dense-mesh (haptic-textures-2005, 3.1) the coat cut "
-      "into small flat triangles; avila and cross-uncross (large-data-2008) an isosurface; virtual-contact-point, "
-      "magnetic and normal-perturbation (hybrid-surface-2004) an implicit surface.",
-      with_default("proxy"));
+  row("type", Type::one_of({}, law_names), what + ".", with_default("proxy"));
   row("formulation", Type::named<Formulation>(), "As the paper prints it, or with its errata resolved.",
       only_if(Test::is("type", two_forms), by), or_else("consistent, or what the law's name says"));
-  row("rho", Type::number({0.0, 1.0 / 3.0, true}),
-      "mesostructure, literal: width of the blended band around edges in barycentric coordinates.",
-      &MesostructureLaw::rho, only_if(by_law({"mesostructure"}), by), only_if(literal("mesostructure"), meso));
-  row("blend", blend_type(), blend_help, bound_blend(&MesostructureLaw::blend, &MesostructureLaw::blend_map),
-      only_if(by_law({"mesostructure"}), by), only_if(literal("mesostructure"), meso));
-  row("test_neighbours", Type::boolean(),
-      "mesostructure, literal: every neighbouring prism that holds the probe has a say (hrm-2010, 4.2), not those in "
-      "the band alone.",
-      &MesostructureLaw::test_neighbours, only_if(by_law({"mesostructure"}), by),
-      only_if(literal("mesostructure"), meso));
-  row("edge_taper", Type::number({0.0, 1.0 / 3.0}),
-      "height-field: share of each triangle over which heights fall to 0 towards its edges; 0 turns it off.",
-      &HeightFieldLaw::edge_taper, only_if(by_law({"height-field"}), by), or_else("0; 0.05 for height-field-literal"));
-  row("subdivisions", Type::integer(1, most_generated_subdivisions), "Cuts along each edge of a base triangle.",
-      &GeneratedGeometryLaw::subdivisions, only_if(Test::is("type", {"generated-geometry"}), by));
-  row("subdivisions", Type::integer(1, most_generated_subdivisions),
-      "Cuts along each edge of a base triangle; at most 4,194,304 triangles in all.", &DenseMeshLaw::subdivisions,
-      only_if(Test::is("type", {"dense-mesh"}), by),
-      or_else("triangles of a texel, or coarser ones if those are too many"),
-      by_contents("more triangles than it may make"));
-  row("influence_radius", length(positive),
-      "generated-geometry: distance around the proxy within which triangles are made.",
-      &GeneratedGeometryLaw::influence_radius, only_if(Test::is("type", {"generated-geometry"}), by),
-      or_else("one and a half of their edges"));
-  row("band", Type::number(not_negative),
-      "avila: width of the layer that pushes, in the field's unit, from the threshold inwards; 0 chooses it by the "
-      "stiffness.",
-      &AvilaLaw::band, only_if(by_law({"avila"}), by));
-  row("band", length(positive), "magnetic: width of the band outside the surface that attracts.", &MagneticLaw::band,
-      only_if(by_law({"magnetic"}), by));
-  row("largest_force", force(positive), "avila: force at the layer's end.", &AvilaLaw::largest_force,
-      only_if(by_law({"avila"}), by));
-  row("retarding", damping(not_negative), "avila: resistance against motion within.", &AvilaLaw::retarding,
-      only_if(by_law({"avila"}), by));
-  row("retarding", damping(not_negative), "cross-uncross: resistance against motion within.",
-      &CrossUncrossLaw::retarding, only_if(by_law({"cross-uncross"}), by));
-  row("reach", length(not_negative),
-      "cross-uncross, literal: how far along the gradient the surface is looked for; 0: 64 cells.",
-      &CrossUncrossLaw::reach, only_if(by_law({"cross-uncross"}), by), only_if(literal("cross-uncross"), crossed));
-  row("magnitude", Type::named<ContactMagnitude>(),
-      "virtual-contact-point, literal: how far the contact is taken to be: the distance to the virtual contact point, "
-      "or what the potential says (Avila and Sobierajski 1996).",
-      &VirtualContactPointLaw::magnitude, only_if(by_law({"virtual-contact-point"}), by),
-      only_if(literal("virtual-contact-point"), contact));
-  row("depth_gain", Type::number(not_negative),
-      "virtual-contact-point: d of eq. 2, by which friction grows with penetration (1/m).",
-      &VirtualContactPointLaw::depth_gain, only_if(by_law({"virtual-contact-point"}), by));
-  row("offset", length(not_negative),
-      "virtual-contact-point: the force pushes out to where the potential is this, so that thin objects have volume.",
-      &VirtualContactPointLaw::offset, only_if(by_law({"virtual-contact-point"}), by),
-      by_contents("more than is stored of the potential"));
+  for (const LawKind* kind : law_kinds()) {
+    const std::string name(kind->facts->name);
+    std::vector<std::string> names{name};
+    if (kind->form != nullptr) names.push_back(name + "-literal");
+    // The literal form is told by "formulation", or by the name.
+    const Test literal = Test::any({Test::all({Test::given("formulation"), Test::is("formulation", {"literal"})}),
+                                    Test::all({Test::without("formulation"), Test::is("type", {name + "-literal"})})});
+    for (Option& option : law_options(*kind)) {
+      option.help = fmt::format("{}{}: {}", name, option.printed.empty() ? "" : ", literal", option.help);
+      option.only_if(Test::is("type", names), by);
+      if (!option.printed.empty())
+        option.only_if(literal, fmt::format("by the consistent law \"{}\", {}", name, option.printed));
+      row.rows.push_back(std::move(option));
+    }
+  }
 }
 
 void material(SceneObject& row) {

@@ -82,9 +82,7 @@ void surface(SceneObject& row) {
       or_else("none, or what the materials of a glTF file say"));
   row("texture", Type::object("texture"),
       "Fine features: felt as friction, as a lateral force, or as geometry, by their size.", or_else("none"));
-  row("law",
-      Type::any({Type::one_of(law_names(), custom_law_names), Type::object("law"), Type::numbers(custom_law_names)})
-          .saying("a law's name or an object"),
+  row("law", Type::any({Type::one_of({}, law_names), Type::object("law")}).saying("a law's name or an object"),
       "How it is felt: a law's name, or an object.", with_default("proxy"),
       by_contents("a law that cannot be felt on this surface"));
   row("material", Type::object("material"), "What it is made of.");

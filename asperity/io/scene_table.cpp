@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 
 #include "asperity/core/suggest.h"
 #include "asperity/io/detail/scene_json.h"
 #include "asperity/io/detail/scene_rows.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity {
 namespace {
@@ -125,7 +128,7 @@ class StructureCheck {
     if (first.type.kind == OptionKind::choice && json.contains(first.key))
       ASPERITY_CHECK(value(json[first.key], at(first.key), first.type));
     for (const auto& item : json.items()) {
-      if (object.row(item.key(), json) == nullptr) return unknown_key(item.key(), at(item.key()), object);
+      if (object.row(item.key(), json) == nullptr) return unknown_key(item.key(), at(item.key()), json, object);
     }
     // In the table's order: what others depend on stands before them.
     for (const Option& row : object.rows) {
@@ -150,8 +153,11 @@ class StructureCheck {
     return refused(ErrorCode::bad_type, fmt::format("is {}", json_type(json)), place, accepted);
   }
 
-  static Error unknown_key(const std::string& key, const std::string& place, const SceneObject& object) {
-    const std::vector<std::string> known = object.keys();
+  static Error unknown_key(const std::string& key, const std::string& place, const SceneJson& json,
+                           const SceneObject& object) {
+    // Those that say something beside what is there.
+    std::vector<std::string> known = object.keys();
+    std::erase_if(known, [&](const std::string& one) { return !object.reads(*object.row(one, json), json); });
     const std::string near = nearest_name(key, known);
     const bool vowel = object.name.find_first_of("aeiou") == 0;
     return refused(ErrorCode::bad_key,
@@ -279,8 +285,13 @@ std::vector<std::pair<const Option*, OptionValue>> SceneObject::bound(std::type_
 }
 
 const std::vector<SceneObject>& scene_table() {
-  static const std::vector<SceneObject> table = make_table();
-  return table;
+  // One for every number of laws that there were: a program may add some, and who holds a row of before keeps it.
+  static std::mutex guard;
+  static std::map<std::size_t, const std::vector<SceneObject>> tables;
+  const std::lock_guard<std::mutex> alone(guard);
+  const std::size_t laws = law_names().size();
+  const auto found = tables.find(laws);
+  return found != tables.end() ? found->second : tables.emplace(laws, make_table()).first->second;
 }
 
 const SceneObject& scene_object(std::string_view name) {

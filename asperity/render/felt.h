@@ -1,6 +1,7 @@
 #pragma once
 // What is felt of an instance during one tick: the one visit of its surface.
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -37,12 +38,12 @@ auto on_smooth_view(const FeltView& view, Visit&& visit) noexcept {
 
 /// The mesh that a law constrains the proxy with: the dense one, the base of a coated surface, the mesh itself. [servo]
 inline const MeshSurface* constraint_mesh(const Instance& instance) noexcept {
-  return std::holds_alternative<DenseMeshLaw>(instance.law) ? &instance.dense->surface : base_of(instance.surface);
+  return instance.law.facts().proxy == LawProxy::dense_mesh ? &instance.dense->surface : base_of(instance.surface);
 }
 
 /// Whether the proxy is led along the surface itself rather than along triangles. [servo]
 inline bool follows_smoothly(const Instance& instance) noexcept {
-  return std::holds_alternative<ProxyLaw>(instance.law) && provider_of<MeshSurface>(instance.surface) == nullptr;
+  return instance.law.facts().proxy == LawProxy::surface && provider_of<MeshSurface>(instance.surface) == nullptr;
 }
 
 /// One instance in one tick.
@@ -58,6 +59,10 @@ struct Touched {
   CoatMoment moment = {};        ///< of the coat, felt now
   FeltView view = {};            ///< once all of this is known
 
+  /// The view of a law that needs a coat, a field, a potential.
+  [[nodiscard]] const ReliefView& relief() const noexcept { return *std::get_if<ReliefView>(&view); }
+  [[nodiscard]] const IsoView& iso() const noexcept { return *std::get_if<IsoView>(&view); }
+  [[nodiscard]] const ImplicitSurface& implicit() const noexcept { return *implicit_of(instance->surface); }
   /// Where a point's proxy rests on it; unknown where none does.
   [[nodiscard]] Place resting_place() const noexcept { return contact->surface.rests ? contact->first() : Place{}; }
   [[nodiscard]] Vec3 to_local(const Vec3& p) const noexcept { return at_origin ? p : pose->apply_inverse(p); }
@@ -68,6 +73,20 @@ struct Touched {
     return {to_local(motion.from), to_local(motion.to)};
   }
 };
+
+/// Adds the material's damping along the contact normal, never turning the push into a pull. [servo]
+inline Vec3 with_damping(const Vec3& force, const Vec3& normal, const Vec3& velocity, double damping) noexcept {
+  if (damping == 0.0) return force;
+  const double push = force.dot(normal);
+  const double damped = std::max(0.0, push - damping * velocity.dot(normal));
+  return force + (damped - push) * normal;
+}
+
+/// What the law of a proxy makes of its force at a place that it is held to. [servo]
+inline void finish_by_law(const Touched& touch, const Foot& foot, LawForce& answer) noexcept {
+  const Law& law = touch.instance->law;
+  if (law.kind().finish != nullptr) law.kind().finish(law.settings(), touch, foot, answer);
+}
 
 /// The surface as the instance's law feels it, at its contact's threshold and level and a moment of its coat. [servo]
 inline FeltView felt_view(const Touched& touch) noexcept {

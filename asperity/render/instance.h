@@ -10,7 +10,7 @@
 #include "asperity/core/frames.h"
 #include "asperity/material/material.h"
 #include "asperity/render/fine/features.h"
-#include "asperity/render/laws.h"
+#include "asperity/render/laws/proxy.h"
 #include "asperity/render/view.h"
 #include "asperity/surface/custom/view.h"
 #include "asperity/surface/implicit/surface.h"
@@ -120,6 +120,7 @@ struct InstanceFacts {
   bool changes = false;         ///< and the surface may move or change its shape under the proxy
   bool moment = false;          ///< its coat moves or has levels of detail, and its law feels which
   bool draws = false;           ///< it draws the probe from outside
+  bool custom = false;          ///< its law is a program's own: nothing that it says of its energy is believed
   bool printed = false;         ///< its law is felt as printed: what that gives is paid by nobody
 };
 

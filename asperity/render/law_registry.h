@@ -1,49 +1,44 @@
 #pragma once
-// Laws by their names: those that are built in, and those that a program has added.
+// Laws by their names: those that are built in, and those that a program has added, all by the same registration.
 
-#include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "asperity/core/option.h"
 #include "asperity/core/result.h"
-#include "asperity/render/custom_law.h"
-#include "asperity/render/laws.h"
+#include "asperity/render/law.h"
 
 namespace asperity {
 
-/// "proxy", "god-object", "force-shading", "height-field", "mesostructure", "generated-geometry", "dense-mesh",
-/// "avila", "cross-uncross", "virtual-contact-point", "magnetic", "normal-perturbation", with "-literal" appended where
-/// a law with two forms has that one; a program's own law by the name that it was given. [any]
-std::string law_name(const Law& law);
-/// The law of that name with default options, built in or registered. Errors: bad_value listing the names. [any]
-Result<Law> law_by_name(std::string_view name);
-/// Every built-in name that law_by_name accepts. [any]
-const std::vector<std::string>& law_names();
-/// Its form, where the law has two; nothing where it has one. [any]
-std::optional<Formulation> formulation_of(const Law& law);
-/// A law of the same kind in that form, with the default options of that form: what the name with or without "-literal"
-/// makes. A law with one form: the law itself. [any]
-Law in_formulation(const Law& law, Formulation formulation);
+/// Makes a kind of law known to law_by_name, scene files, the schema and `compare`. To be called before scenes are
+/// read, by one thread. Errors: bad_value (no plain name, a name that is taken, an option twice or that a program keeps
+/// for itself, a default that it would not take). [build]
+Status register_law(const LawKind& kind);
+/// The same for a type. [build]
+template <ContactLaw L>
+Status register_law() {
+  return register_law(detail::law_kind<L>);
+}
+
+/// Every kind, in the order of registration: the built-in ones first. [any]
+const std::vector<const LawKind*>& law_kinds();
+/// Whether the law is one of those. [any]
+bool is_built_in(const Law& law);
+/// What scene files may say of a law beside its type and form. [any]
+std::vector<Option> law_options(const LawKind& kind);
+
 /// Errors: bad_value naming the option and what would be accepted. [build]
 Status validate(const Law& law);
+/// The law as it stands in a scene that is shown `zoom` times its size, by what its options say. [build]
+Law magnified(const Law& law, double zoom);
 
-/// Makes a law of the numbers in a scene file.
-using CustomLawFactory = std::function<Result<CustomLaw>(NamedNumbers& numbers)>;
-
-/// Makes a law known to law_by_name, scene files and `compare --laws`. To be called before scenes are read, by one
-/// thread. Errors: bad_value (no plain name, a name that is taken). [build]
-Status register_custom_law(std::string name, CustomLawFactory factory);
-/// The same for a type that is made from its numbers: T(NamedNumbers&). [build]
-template <ForceLaw T>
-Status register_custom_law(const std::string& name) {
-  return register_custom_law(name, [name](NamedNumbers& numbers) { return CustomLaw::build(T(numbers), name); });
-}
-/// Every registered law. [any]
-const std::vector<std::string>& custom_law_names();
-/// A registered law made from `numbers`. Errors: bad_value (unknown), bad_key (a number that it does not read), and the
-/// factory's own. [build]
-Result<Law> make_custom_law(std::string_view name, NamedNumbers numbers);
+/// What it is called in scene files: its kind's name, with "-literal" appended where a law with two forms has that one.
+/// [any]
+std::string law_name(const Law& law);
+/// The law of that name with default options. Errors: bad_value listing the names. [any]
+Result<Law> law_by_name(std::string_view name);
+/// Every name that law_by_name accepts: "proxy", "god-object", "force-shading", "force-shading-literal", ... [any]
+const std::vector<std::string>& law_names();
 
 }  // namespace asperity

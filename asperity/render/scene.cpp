@@ -17,21 +17,16 @@ namespace asperity {
 
 namespace {
 
-bool needs_coat(const Law& law) {
-  return std::holds_alternative<HeightFieldLaw>(law) || std::holds_alternative<MesostructureLaw>(law) ||
-         std::holds_alternative<GeneratedGeometryLaw>(law) || std::holds_alternative<DenseMeshLaw>(law);
-}
-
 /// The relief as a mesh, where the law feels that; the one that the instance brings if it was made from the same.
 Status make_dense(Instance& instance, std::size_t index) {
-  const auto* law = std::get_if<DenseMeshLaw>(&instance.law);
-  if (law == nullptr) {
+  if (instance.law.facts().proxy != LawProxy::dense_mesh) {
     instance.dense.reset();
     return success();
   }
   const ReliefSurface& relief = **std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   const std::uint64_t identity = relief.identity();
-  const int subdivisions = law->subdivisions > 0 ? law->subdivisions : texel_subdivisions(relief);
+  const int asked = instance.law.facets().subdivisions;
+  const int subdivisions = asked > 0 ? asked : texel_subdivisions(relief);
   if (instance.dense != nullptr && instance.dense->relief == identity && instance.dense->subdivisions == subdivisions)
     return success();
   Result<TriangleMesh> mesh = tessellate(relief, subdivisions);
@@ -41,84 +36,63 @@ Status make_dense(Instance& instance, std::size_t index) {
   return success();
 }
 
-/// Whether the law's reach lies within the band that the potential is stored in, and what it reads is there.
+/// Whether the law's reach lies within the band that the potential is stored in.
 Status check_potential(const Instance& instance, const std::string& place) {
   const ImplicitSurface& surface = *implicit_of(instance.surface);
-  double reach = 0.0;
-  const char* key = ".offset";
-  if (const auto* contact = std::get_if<VirtualContactPointLaw>(&instance.law)) reach = contact->offset;
-  if (const auto* magnetic = std::get_if<MagneticLaw>(&instance.law)) {
-    reach = magnetic->band;
-    key = ".band";
+  const LawReach reach = instance.law.outside();
+  if (reach.distance <= surface.reach_outside()) return success();
+  return bad_value(fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach.distance),
+                               instance.name, format_length(surface.grid().outside())),
+                   fmt::format("{}.law.{}", place, reach.option),
+                   fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside())));
+}
+
+/// What a law needs that the surface has not; nothing where it has all.
+std::string lacking(const Law& law, const Instance& instance) {
+  const bool volume = iso_of(instance.surface) != nullptr;
+  const bool triangles = !volume && base_of(instance.surface) != nullptr;
+  const bool relief = relief_of(instance) != nullptr;
+  switch (law.facts().needs) {
+    case LawNeeds::triangles:
+      if (!triangles) return "triangles";
+      break;
+    case LawNeeds::coat:
+      if (!relief) return "a coat";
+      break;
+    case LawNeeds::field:
+      if (!volume) return "a volume";
+      break;
+    case LawNeeds::potential:
+      if (implicit_of(instance.surface) == nullptr) return "an implicit surface";
+      break;
+    case LawNeeds::nothing: break;
   }
-  if (reach > surface.reach_outside()) {
-    return bad_value(
-        fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach), instance.name,
-                    format_length(surface.grid().outside())),
-        place + ".law" + key,
-        fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside())));
-  }
-  if (std::holds_alternative<NormalPerturbationLaw>(instance.law) && surface.offset() > 0.0) {
-    return refused(
-        ErrorCode::unsupported_pair,
-        fmt::format("the law \"normal-perturbation\" touches the mesh itself, and \"{}\" has an offset of {}",
-                    instance.name, format_length(surface.offset())),
-        place + ".law", "another law, or implicit.offset 0");
-  }
-  if (std::holds_alternative<NormalPerturbationLaw>(instance.law) &&
-      (surface.mesh() == nullptr || !surface.textured())) {
-    return refused(ErrorCode::unsupported_pair,
-                   fmt::format("the law \"normal-perturbation\" needs a mesh with a texture, and \"{}\" has no {}",
-                               instance.name, surface.mesh() == nullptr ? "mesh" : "texture"),
-                   place + ".law", "another law, or implicit.texture on a mesh");
-  }
-  return success();
+  return law.lacks(instance);
 }
 
 /// Whether the law can be felt on the surface at all.
 Status check_pair(const Instance& instance, const std::string& place) {
-  const bool iso = iso_of(instance.surface) != nullptr;
-  const bool implicit = implicit_of(instance.surface) != nullptr;
-  const bool parametric = parametric_of(instance.surface) != nullptr;
-  const bool bare = instance.surface.index() == 0;
-  const CustomSurface* custom = custom_of(instance.surface);
-  const auto refuse = [&](const char* what, const char* accepted) {
-    return refused(ErrorCode::unsupported_pair,
-                   fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), what, instance.name,
-                               implicit     ? "an implicit surface"
-                               : iso        ? "an isosurface"
-                               : parametric ? "a parametric surface"
-                               : custom     ? "a surface of its own"
-                               : bare       ? "a bare mesh"
-                                            : "a relief"),
-                   place + ".law", accepted);
-  };
-  if (const CustomLaw* own = custom_of(instance.law)) {
-    if (own->fits(instance.surface)) return success();
-    return refuse("another kind of surface", "another law, or a surface that this one says it fits");
+  const std::string lacks = lacking(instance.law, instance);
+  if (lacks.empty())
+    return instance.law.facts().needs == LawNeeds::potential ? check_potential(instance, place) : success();
+  constexpr const char* kinds[] = {"a bare mesh",          "a relief",
+                                   "an isosurface",        "an implicit surface",
+                                   "a parametric surface", "a surface of its own"};
+  std::string others;
+  for (const LawKind* kind : law_kinds()) {
+    if (lacking(Law(*kind), instance).empty()) others += (others.empty() ? "" : ", ") + std::string(kind->facts->name);
   }
-  if (needs_field(instance.law) && !iso) return refuse("a volume", "another law, or a surface with a volume");
-  if (needs_potential(instance.law) && !implicit)
-    return refuse("an implicit surface", "another law, or a surface with \"implicit\"");
-  if (implicit && needs_potential(instance.law)) return check_potential(instance, place);
-  if (iso && !needs_field(instance.law) && !std::holds_alternative<ProxyLaw>(instance.law)) {
-    return refuse(needs_coat(instance.law) ? "a coat" : "triangles",
-                  implicit ? "proxy, virtual-contact-point, magnetic, normal-perturbation, avila or cross-uncross"
-                           : "proxy, avila or cross-uncross");
-  }
-  if ((parametric || custom != nullptr) && !std::holds_alternative<ProxyLaw>(instance.law))
-    return refuse(needs_coat(instance.law) ? "a coat" : "triangles", "proxy");
-  if (bare && needs_coat(instance.law))
-    return refuse("a coat", "proxy, god-object or force-shading, or a coat on the mesh");
-  return success();
+  return refused(ErrorCode::unsupported_pair,
+                 fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), lacks, instance.name,
+                             kinds[instance.surface.index()]),
+                 place + ".law", others);
 }
 
 /// Whether what a coat adds beside its heights can be felt by the law.
 Status check_coat(const Instance& instance, const std::string& place, double probe_radius) {
   const ReliefSurface* relief = relief_of(instance);
-  const bool proxy = std::holds_alternative<ProxyLaw>(instance.law);
-  const bool by_coat = proxy || std::holds_alternative<HeightFieldLaw>(instance.law) ||
-                       std::holds_alternative<MesostructureLaw>(instance.law);
+  const bool proxy = instance.law.facts().proxy == LawProxy::surface;
+  const bool by_coat = instance.law.facts().coat == LawCoat::moment;
   const auto refuse = [&](std::string what, const char* where, const char* accepted) {
     return refused(ErrorCode::unsupported_pair, std::move(what), place + where, accepted);
   };
@@ -157,7 +131,7 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
   ASPERITY_CHECK(check_coat(instance, place, probe_radius));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
-  if (probe_radius > 0.0 && !constrains(instance.law)) {
+  if (probe_radius > 0.0 && !instance.law.constrains()) {
     return refused(ErrorCode::unsupported_pair,
                    fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
                                law_name(instance.law), format_length(probe_radius)),
@@ -224,12 +198,7 @@ void magnify(Instance& instance, double zoom) {
   friction.break_away *= force;
   friction.stick_speed *= speed;
   friction.stribeck_speed *= speed;
-  if (auto* avila = std::get_if<AvilaLaw>(&instance.law)) {
-    avila->largest_force *= force;
-    avila->retarding *= stiffness;
-  }
-  if (auto* crossing = std::get_if<CrossUncrossLaw>(&instance.law)) crossing->retarding *= stiffness;
-  if (auto* contact = std::get_if<VirtualContactPointLaw>(&instance.law)) contact->depth_gain *= zoom;
+  instance.law = magnified(instance.law, zoom);
 }
 
 Status check(const SceneSettings& settings) {
@@ -280,7 +249,8 @@ Box swept_bounds(const Instance& instance, const Box& local) {
 /// Whether its coat moves or has levels of detail, and its law feels which.
 bool feels_changing_coat(const Instance& instance) {
   const ReliefSurface* relief = relief_of(instance);
-  return relief != nullptr && feels_moment(instance.law) && (relief->coat().moves() || relief->coat().levels() > 0);
+  return relief != nullptr && instance.law.facts().coat == LawCoat::moment &&
+         (relief->coat().moves() || relief->coat().levels() > 0);
 }
 
 /// Whether the surface may move or change its shape under the probe.
@@ -297,10 +267,10 @@ InstanceFacts facts_of(const Instance& instance) {
   InstanceFacts facts;
   facts.identity = surface_identity(instance.surface);
   facts.sides = sides_of(instance);
-  facts.constrains = constrains(instance.law);
+  facts.constrains = instance.law.constrains();
   facts.smooth = follows_smoothly(instance);
-  facts.facets = std::holds_alternative<GeneratedGeometryLaw>(instance.law);
-  facts.by_planes = facts.facets || std::holds_alternative<DenseMeshLaw>(instance.law);
+  facts.facets = instance.law.facts().proxy == LawProxy::facets;
+  facts.by_planes = facts.facets || instance.law.facts().proxy == LawProxy::dense_mesh;
   facts.volume = iso_of(instance.surface) != nullptr;
   facts.varies = has_local_material(instance);
   facts.holds_friction = proxy_holds_friction(instance);
@@ -312,7 +282,8 @@ InstanceFacts facts_of(const Instance& instance) {
   facts.changes = facts.constrains && changes(instance);
   facts.moment = feels_changing_coat(instance);
   facts.draws = attraction_reach(instance) > 0.0;
-  facts.printed = formulation_of(instance.law) == Formulation::literal;
+  facts.custom = !is_built_in(instance.law);
+  facts.printed = instance.law.formulation() == Formulation::literal;
   return facts;
 }
 
@@ -331,18 +302,14 @@ Status check_motion(const Instance& instance, std::size_t index) {
 
 /// What a magnet gives to a hand that it draws in (J).
 double well_of(const Instance& instance) noexcept {
-  double stiffness = 0.0;
-  double band = 0.0;
-  if (const auto* law = std::get_if<MagneticLaw>(&instance.law); law != nullptr) {
-    stiffness = instance.material.stiffness;
-    band = law->band;
-  } else if (attraction_reach(instance) > 0.0) {
+  double well = instance.law.well(instance.material);
+  if (attraction_reach(instance) > 0.0) {
     const MaterialMaps* maps = relief_of(instance)->coat().materials();
     const bool map = maps != nullptr && maps->has(MaterialChannel::magnetism);
-    stiffness = map ? maps->most(MaterialChannel::magnetism) : instance.material.magnetism;
-    band = instance.material.magnetic_band;
+    const double magnetism = map ? maps->most(MaterialChannel::magnetism) : instance.material.magnetism;
+    well += magnetism * instance.material.magnetic_band * instance.material.magnetic_band / 6.0;
   }
-  return stiffness * band * band / 6.0;
+  return well;
 }
 
 }  // namespace

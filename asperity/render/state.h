@@ -4,53 +4,23 @@
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <type_traits>
-#include <variant>
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/frames.h"
 #include "asperity/core/place.h"
 #include "asperity/material/friction.h"
 #include "asperity/render/energy/account.h"
-#include "asperity/render/laws.h"
+#include "asperity/render/law.h"
 #include "asperity/render/view.h"
 #include "asperity/surface/view.h"
 
 namespace asperity {
 
-// --- what laws remember ---
-// Each type says by `of_surface` whether it means something on another surface that the same law is felt on.
-
-/// Cross-uncross. The point crossed and the gradient saved there are the contact's place and normal.
-struct CrossingMemory {
-  static constexpr bool of_surface = true;
-  Vec3 previous = Vec3::Zero();  ///< the probe at the last tick (m, object frame)
-  double value = 0.0;            ///< of the field there
-  bool crossed = false;          ///< the flag of the paper
-};
-
-/// Virtual contact point and magnet. The contact point and the direction of its push are the contact's place and
-/// normal.
-struct ContactPointMemory {
-  static constexpr bool of_surface = true;
-  Vec3 previous = Vec3::Zero();  ///< the probe at the last tick (m, object frame)
-  bool pushed = false;           ///< at the last tick
-};
-
-/// A law that a program has added.
-struct CustomMemory {
-  static constexpr bool of_surface = false;
-  std::uint64_t law = 0;  ///< that it belongs to; 0: none
-  std::array<std::byte, 64> bytes{};
-};
-
-using LawMemory = std::variant<std::monostate, CrossingMemory, ContactPointMemory, CustomMemory>;
-
 // --- what a contact remembers, by what it belongs to ---
 
 /// Of the law: goes on while the instance is felt by the same one.
 struct OfLaw {
-  std::size_t index = std::variant_npos;  ///< in Law
+  const LawKind* kind = nullptr;
   LawMemory memory;
   FrictionState friction;      ///< of the friction law, where it is not within the proxy (object frame)
   Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last (object frame)
@@ -93,12 +63,6 @@ struct Contact {
   void put(const Place& place) noexcept {
     surface.places.clear();
     surface.places.push_back(place);
-  }
-  /// What the instance's law remembers, made anew where it is another one's. [servo]
-  template <class Memory>
-  Memory& memory() noexcept {
-    if (Memory* held = std::get_if<Memory>(&law.memory)) return *held;
-    return law.memory.emplace<Memory>();
   }
 };
 static_assert(sizeof(Contact) <= 520);

@@ -134,7 +134,7 @@ class SeriesBuilder {
   [[nodiscard]] Felt in_object(const Instance& instance, const TraceRecord& tick) const {
     const Pose pose = pose_of(instance, tick);
     return {pose, pose.rotate_inverse(force_in_scene(tick)),
-            pose.apply_inverse(constrains(instance.law) ? tick.rendered.proxy : in_scene(tick))};
+            pose.apply_inverse(instance.law.constrains() ? tick.rendered.proxy : in_scene(tick))};
   }
 
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
@@ -160,8 +160,7 @@ class SeriesBuilder {
     const Instance* instance = touched(tick);
     const double depth = tick.rendered.contact.penetration;
     double push = instance ? stiffness_at(*instance, tick) * depth : 0.0;
-    // M1's layer is as stiff as the field is steep.
-    if (instance && std::holds_alternative<AvilaLaw>(instance->law))
+    if (instance && !instance->law.facts().linear)
       push = std::max(0.0, force_in_scene(tick).dot(tick.rendered.contact.normal));
     out_.stored.push_back(0.5 * push * depth + tick.rendered.parts.held);
   }
@@ -183,7 +182,7 @@ class SeriesBuilder {
       const IsoSurface& iso = *iso_of(shape);
       // The proxy is also held from the inside.
       add_smooth(*instance, iso.view(caches_[tick.rendered.contact.instance]), iso.bounds(), tick,
-                 constrains(instance->law));
+                 instance->law.constrains());
       if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
         add_texture(*instance, *implicit, tick);
       return;
@@ -194,7 +193,7 @@ class SeriesBuilder {
     if (const ParametricSurface* parametric = parametric_of(shape)) return smooth(*parametric);
     if (const CustomSurface* custom = custom_of(shape)) return smooth(*custom);
     const MeshSurface& base = *base_of(shape);
-    const bool proxied = constrains(instance->law);
+    const bool proxied = instance->law.constrains();
     const auto [pose, force, felt] = in_object(*instance, tick);
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     BasePoint at = base_point(base, felt, cache);
@@ -240,7 +239,7 @@ class SeriesBuilder {
   void add_smooth(const Instance& instance, const View& view, const Box& bounds, const TraceRecord& tick,
                   bool either_side) {
     auto [pose, force, felt] = in_object(instance, tick);
-    if (!constrains(instance.law)) felt += force / scene_stiffness(instance, tick);
+    if (!instance.law.constrains()) felt += force / scene_stiffness(instance, tick);
     const Foot foot = view.nearest(felt, bounds.diagonal());
     if (!foot.found()) return;
     const Vec3 front = view.front(foot);
@@ -283,7 +282,7 @@ class SeriesBuilder {
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     const BasePoint at = base_point(*surface.mesh(), felt, cache);
     if (at.face == no_index) return;
-    const double deflection = constrains(instance.law) ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
+    const double deflection = instance.law.constrains() ? 0.0 : force.dot(at.up) / scene_stiffness(instance, tick);
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.view(cache).first_touch({base + reach * at.up, base - reach * at.up}, Sides::front);
@@ -328,7 +327,8 @@ class SeriesBuilder {
     if (coat_of(shape) != nullptr) {
       reference = at.slope;
       // A two-sided sheet touched from behind pushes the other way.
-      if (follows_relief(instance.law) && reference.dot(force) < 0.0) reference = -reference;
+      if (instance.law.facts().coat >= LawCoat::relief && instance.law.constrains() && reference.dot(force) < 0.0)
+        reference = -reference;
     } else if (reference.dot(force) < 0.0) {
       reference = -reference;
     }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/surface/shell.h"

@@ -93,12 +93,65 @@ TEST_F(CustomPrograms, LawsNumbersAreReadByName) {
   write("typo.json", R"({"surfaces":[{"mesh":{"generator":"M_a"},"law":{"type":"hunt-crossley","exponant":1.2}}]})");
   const Call typo = run(law_, "touch typo.json");
   EXPECT_EQ(typo.code, 2);
-  EXPECT_TRUE(has(typo.err, "surfaces[0].law.exponant: is read by nobody; did you mean \"exponent\"?")) << typo.err;
+  EXPECT_TRUE(has(typo.err,
+                  "surfaces[0].law.exponant: is not a key of a law; did you mean \"exponent\"?; accepted: "
+                  "type, exponent, damping\n"))
+      << typo.err;
   write("low.json", R"({"surfaces":[{"mesh":{"generator":"M_a"},"law":{"type":"hunt-crossley","exponent":0.5}}]})");
   EXPECT_EQ(run(law_, "touch low.json").code, 2);
   const Call near = run(law_, "compare sheet.json --laws hunt-crosley");
   EXPECT_EQ(near.code, 2);
   EXPECT_TRUE(has(near.err, "did you mean \"hunt-crossley\"?")) << near.err;
+}
+
+TEST_F(CustomPrograms, AnAddedLawIsFoundWhereverLawsAre) {
+  const std::string added = ASPERITY_ADDED_LAW;
+  write("felt.json", R"({"name":"felt","surfaces":[{"mesh":{"generator":"M_a"},"law":{"type":"felt-layer-literal",)"
+                     R"("pile":"2 mm","recovery":"80 ms"}}],)" +
+                         stroke());
+  // The schema: what it can be told, with types and ranges.
+  const Call schema = run(added, "schema");
+  ASSERT_EQ(schema.code, 0) << schema.err;
+  const json law = json::parse(schema.out)["definitions"]["law"];
+  EXPECT_TRUE(has(law["properties"]["type"].dump(), "\"felt-layer-literal\"")) << law["properties"]["type"].dump();
+  for (const char* key : {"pile", "share", "recovery"}) EXPECT_TRUE(law["properties"].contains(key)) << key;
+  EXPECT_FALSE(has(run(ASPERITY_PROGRAM, "schema").out, "felt-layer"));
+  // The help: of a key, of the command, and the reference page.
+  const Call key = run(added, "schema law.recovery");
+  EXPECT_TRUE(has(key.out, "felt-layer, literal: time in which it stands up again.")) << key.out;
+  EXPECT_TRUE(has(run(added, "schema --page").out, "felt-layer: height of the nap."));
+  for (const char* command : {"touch", "compare"}) {
+    const Call help = run(added, std::string(command) + " --help");
+    EXPECT_TRUE(has(help.out, "* felt-layer: a nap that yields before the ground does (of these tests, eq. 1)"))
+        << help.out;
+  }
+  // compare: where nobody says which laws, in both of its forms; and what each felt differs.
+  const Call compared = run(added, "compare felt.json --out compared --json");
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  std::vector<std::string> laws;
+  const json document = json::parse(compared.out);
+  for (const json& one : document["laws"]) laws.push_back(one["law"]);
+  EXPECT_EQ(laws,
+            (std::vector<std::string>{"proxy", "god-object", "force-shading", "felt-layer", "felt-layer-literal"}));
+  EXPECT_TRUE(has(read("compared/report.html"), "a nap that yields before the ground does"));
+  // The report, and the scene as it was felt, written out.
+  const Call touched = run(added, "touch felt.json --out touched --json");
+  ASSERT_EQ(touched.code, 0) << touched.err;
+  EXPECT_EQ(json::parse(touched.out)["law"], "felt-layer-literal");
+  EXPECT_TRUE(has(read("touched/report.html"), "felt-layer-literal"));
+  EXPECT_EQ(run(added, "replay touched/trace.asptrace").code, 0);
+  // Bad values are refused one by one, as those of any law.
+  const auto refused = [&](const std::string& options, const char* message) {
+    write("bad.json", R"({"surfaces":[{"mesh":{"generator":"M_a"},"law":{"type":"felt-layer",)" + options + "}}]}");
+    const Call call = run(added, "touch bad.json");
+    EXPECT_EQ(call.code, 2) << options;
+    EXPECT_TRUE(has(call.err, message)) << call.err;
+  };
+  refused(R"("pile":"-1 mm")", "surfaces[0].law.pile: is -0.001; accepted: a number above 0 (m");
+  refused(R"("share":1.5)", "surfaces[0].law.share: is 1.5; accepted: a number 0 to 1");
+  refused(R"("recovery":"80 ms")", "is not read by the consistent law \"felt-layer\", whose nap has no memory");
+  refused(R"("pyle":1)", "did you mean \"pile\"?; accepted: type, formulation, pile, share");
+  refused(R"("band":1)", "surfaces[0].law.band: is not read by the law \"felt-layer\"");
 }
 
 TEST_F(CustomPrograms, SurfaceIsTouchedDrawnAndInspected) {

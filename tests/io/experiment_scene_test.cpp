@@ -212,14 +212,14 @@ TEST_F(ExperimentScene, LawsTakeNamesOrObjects) {
   EXPECT_EQ(law_name(law("\"height-field-literal\"")), "height-field-literal");
   const Law meso = law(R"({"type":"mesostructure","formulation":"literal","rho":0.1,"blend":"linear"})");
   EXPECT_EQ(law_name(meso), "mesostructure-literal");
-  EXPECT_EQ(std::get<MesostructureLaw>(meso).rho, 0.1);
-  EXPECT_EQ(std::get<MesostructureLaw>(meso).blend, Blend::linear);
-  EXPECT_EQ(std::get<HeightFieldLaw>(law(R"({"type":"height-field","edge_taper":0.2})")).edge_taper, 0.2);
+  EXPECT_EQ(meso.as<MesostructureLaw>()->rho, 0.1);
+  EXPECT_EQ(meso.as<MesostructureLaw>()->blend, Blend::linear);
+  EXPECT_EQ(law(R"({"type":"height-field","edge_taper":0.2})").as<HeightFieldLaw>()->edge_taper, 0.2);
   const Law image = law(R"({"type":"mesostructure-literal","blend":{"image":"map.png"}})");
-  EXPECT_EQ(std::get<MesostructureLaw>(image).blend, Blend::image);
-  ASSERT_EQ(std::get<MesostructureLaw>(image).blend_map.size(), 16u);
-  EXPECT_EQ(std::get<MesostructureLaw>(image).blend_map.front(), 0.0);
-  EXPECT_NEAR(std::get<MesostructureLaw>(image).blend_map.back(), 1.0, 1e-6);
+  EXPECT_EQ(image.as<MesostructureLaw>()->blend, Blend::image);
+  ASSERT_EQ(image.as<MesostructureLaw>()->blend_map.size(), 16u);
+  EXPECT_EQ(image.as<MesostructureLaw>()->blend_map.front(), 0.0);
+  EXPECT_NEAR(image.as<MesostructureLaw>()->blend_map.back(), 1.0, 1e-6);
 }
 
 TEST_F(ExperimentScene, WithLawChangesEverySurface) {

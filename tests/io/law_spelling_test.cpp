@@ -23,11 +23,11 @@ TEST(LawSpelling, BothSpellingsOfAFormMakeTheSameLaw) {
     EXPECT_EQ(written(name), expected);
     EXPECT_EQ(written({{"type", name}}), expected);
     EXPECT_EQ(written(law_json(law)), expected);
-    const std::optional<Formulation> form = formulation_of(law);
+    const std::optional<Formulation> form = law.formulation();
     if (!form) continue;
     ++forms;
     const char* told = *form == Formulation::literal ? "literal" : "consistent";
-    const std::string plain = law_name(in_formulation(law, Formulation::consistent));
+    const std::string plain = law_name(law.in_form(Formulation::consistent));
     EXPECT_EQ(written({{"type", plain}, {"formulation", told}}), expected) << name;
     EXPECT_EQ(written({{"type", plain + "-literal"}, {"formulation", told}}), expected) << name;
   }
@@ -39,8 +39,8 @@ TEST(LawSpelling, TheTaperOfTheLiteralHeightFieldCanBeTurnedOff) {
                                 SceneJson{{"type", "height-field"}, {"formulation", "literal"}, {"edge_taper", 0}}}) {
     const Result<ScenePart<Law>> law = read_law(json, "law", SceneContext{});
     ASSERT_TRUE(law.ok());
-    EXPECT_EQ(std::get<HeightFieldLaw>(law->value).edge_taper, 0.0);
-    EXPECT_EQ(std::get<HeightFieldLaw>(law->value).formulation, Formulation::literal);
+    EXPECT_EQ(law->value.as<HeightFieldLaw>()->edge_taper, 0.0);
+    EXPECT_EQ(law->value.as<HeightFieldLaw>()->formulation, Formulation::literal);
   }
 }
 

@@ -187,7 +187,7 @@ TEST_F(ReliefScene, FilletsAreReadAndTheLiteralTestOfNeighbours) {
       R"({"surfaces":[{"mesh":{"generator":"M_e","rings":2,"mean_edge":0.01},"law":{"type":"mesostructure-literal","test_neighbours":true},"coat":{"height_map":{"generator":"H_0"},"height":0,"mapping":"uv","stitching":{"folds":"fillet","fillet_radius":"1 mm"}}}]})");
   EXPECT_EQ(coat(e).settings().stitching.folds, FoldMode::fillet);
   EXPECT_EQ(coat(e).settings().stitching.fillet_radius, 1e-3);
-  EXPECT_TRUE(std::get_if<MesostructureLaw>(&instance(e).law)->test_neighbours);
+  EXPECT_TRUE(instance(e).law.as<MesostructureLaw>()->test_neighbours);
   comes_back(e);
   refused(scene(ramp_coat(R"("stitching":{"fillet_radius":"1 mm"})")), "surfaces[0].coat.stitching.fillet_radius");
 }

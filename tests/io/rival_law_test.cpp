@@ -22,13 +22,13 @@ class RivalLaw : public ExperimentTest {
 
 TEST_F(RivalLaw, OptionsAreRead) {
   const Law plain = law_of(R"("generated-geometry")");
-  EXPECT_EQ(std::get<GeneratedGeometryLaw>(plain).subdivisions, GeneratedGeometryLaw{}.subdivisions);
-  EXPECT_EQ(std::get<GeneratedGeometryLaw>(plain).influence_radius, 0.0);
+  EXPECT_EQ(plain.as<GeneratedGeometryLaw>()->subdivisions, GeneratedGeometryLaw{}.subdivisions);
+  EXPECT_EQ(plain.as<GeneratedGeometryLaw>()->influence_radius, 0.0);
   const Law generated = law_of(R"({"type":"generated-geometry","subdivisions":48,"influence_radius":"0.3 mm"})");
-  EXPECT_EQ(std::get<GeneratedGeometryLaw>(generated).subdivisions, 48);
-  EXPECT_DOUBLE_EQ(std::get<GeneratedGeometryLaw>(generated).influence_radius, 3e-4);
-  EXPECT_EQ(std::get<DenseMeshLaw>(law_of(R"("dense-mesh")")).subdivisions, 0);
-  EXPECT_EQ(std::get<DenseMeshLaw>(law_of(R"({"type":"dense-mesh","subdivisions":5})")).subdivisions, 5);
+  EXPECT_EQ(generated.as<GeneratedGeometryLaw>()->subdivisions, 48);
+  EXPECT_DOUBLE_EQ(generated.as<GeneratedGeometryLaw>()->influence_radius, 3e-4);
+  EXPECT_EQ(law_of(R"("dense-mesh")").as<DenseMeshLaw>()->subdivisions, 0);
+  EXPECT_EQ(law_of(R"({"type":"dense-mesh","subdivisions":5})").as<DenseMeshLaw>()->subdivisions, 5);
 }
 
 TEST_F(RivalLaw, CanonicalCopiesFeelTheSame) {

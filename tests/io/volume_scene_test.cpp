@@ -202,18 +202,18 @@ TEST_F(VolumeScene, LawsOfIsosurfaces) {
   };
   const Law layer =
       law(R"({"type":"avila","formulation":"literal","band":0.5,"largest_force":"2 N","retarding":0.25})");
-  const auto* avila = std::get_if<AvilaLaw>(&layer);
+  const auto* avila = layer.as<AvilaLaw>();
   ASSERT_NE(avila, nullptr);
   EXPECT_EQ(avila->formulation, Formulation::literal);
   EXPECT_EQ(avila->band, 0.5);
   EXPECT_EQ(avila->largest_force, 2.0);
   EXPECT_EQ(avila->retarding, 0.25);
   const Law crossing = law(R"({"type":"cross-uncross-literal","retarding":0.5,"reach":"4mm"})");
-  const auto* cross = std::get_if<CrossUncrossLaw>(&crossing);
+  const auto* cross = crossing.as<CrossUncrossLaw>();
   ASSERT_NE(cross, nullptr);
   EXPECT_EQ(cross->formulation, Formulation::literal);
   EXPECT_DOUBLE_EQ(cross->reach, 0.004);
-  EXPECT_TRUE(std::holds_alternative<CrossUncrossLaw>(law(R"("cross-uncross")")));
+  EXPECT_TRUE(law(R"("cross-uncross")").is<CrossUncrossLaw>());
   const auto wrong = [&](const std::string& json) {
     return bad(R"({"surfaces":[{"volume":"ball.json","iso":{"threshold":0},"law":)" + json + "}]}").place;
   };

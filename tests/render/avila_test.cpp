@@ -6,7 +6,8 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/render/law_registry.h"
-#include "asperity/render/laws/forces.h"
+#include "asperity/render/laws.h"
+#include "tests/render/asked_law.h"
 #include "tests/render/volumes.h"
 
 namespace asperity::avila_test {
@@ -27,7 +28,7 @@ struct Touch {
   SurfaceCache cache;
 
   LawForce at(const Vec3& p, const Vec3& v = Vec3::Zero()) {
-    return avila_force(law, *surface, surface->view(cache), material, p, v, state);
+    return test::asked(law, surface, surface->view(cache), material, p, v, Seconds(1e-3), state, cache);
   }
 };
 
@@ -198,10 +199,10 @@ TEST(AvilaLaw, NamesAndOptions) {
   EXPECT_EQ(law_name(Law(AvilaLaw{})), "avila");
   const auto literal = law_by_name("avila-literal");
   ASSERT_TRUE(literal.ok());
-  EXPECT_EQ(std::get<AvilaLaw>(*literal).formulation, Formulation::literal);
+  EXPECT_EQ(literal->as<AvilaLaw>()->formulation, Formulation::literal);
   EXPECT_EQ(law_name(*literal), "avila-literal");
   EXPECT_TRUE(validate(Law(AvilaLaw{})).ok());
-  EXPECT_TRUE(needs_field(*literal));
+  EXPECT_TRUE((literal->facts().needs == LawNeeds::field));
   const auto place_of = [](const AvilaLaw& law) {
     const Status status = validate(Law(law));
     return status.ok() ? std::string("accepted") : status.error().place;

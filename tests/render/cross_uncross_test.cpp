@@ -6,7 +6,8 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/render/law_registry.h"
-#include "asperity/render/laws/forces.h"
+#include "asperity/render/laws.h"
+#include "tests/render/asked_law.h"
 #include "tests/render/volumes.h"
 
 namespace asperity::cross_uncross_test {
@@ -26,13 +27,13 @@ struct Touch {
   SurfaceCache cache;
 
   /// What it remembers of its field.
-  [[nodiscard]] CrossingMemory& memory() { return state.memory<CrossingMemory>(); }
+  [[nodiscard]] CrossUncrossLaw::State& memory() { return detail::law_state<CrossUncrossLaw::State>(state.law.memory); }
 
   LawForce at(const Vec3& p, const Vec3& v = Vec3::Zero()) { return through(surface->view(cache), p, v); }
   LawForce through(const IsoView& view, const Vec3& p, const Vec3& v = Vec3::Zero()) {
     Material material;
     material.stiffness = stiffness;
-    return cross_uncross_force(law, view, material, p, v, state);
+    return test::asked(law, surface, view, material, p, v, Seconds(1e-3), state, cache);
   }
 };
 
@@ -401,10 +402,10 @@ TEST(CrossUncrossLaw, NamesAndOptions) {
   EXPECT_EQ(law_name(Law(CrossUncrossLaw{})), "cross-uncross");
   const auto literal = law_by_name("cross-uncross-literal");
   ASSERT_TRUE(literal.ok());
-  EXPECT_EQ(std::get<CrossUncrossLaw>(*literal).formulation, Formulation::literal);
+  EXPECT_EQ(literal->as<CrossUncrossLaw>()->formulation, Formulation::literal);
   EXPECT_EQ(law_name(*literal), "cross-uncross-literal");
-  EXPECT_TRUE(needs_field(*literal));
-  EXPECT_FALSE(needs_field(Law(ProxyLaw{})));
+  EXPECT_TRUE((literal->facts().needs == LawNeeds::field));
+  EXPECT_FALSE(Law(ProxyLaw{}).facts().needs == LawNeeds::field);
   const auto place_of = [](const CrossUncrossLaw& law) {
     const Status status = validate(Law(law));
     return status.ok() ? std::string("accepted") : status.error().place;

@@ -7,6 +7,7 @@
 
 #include "asperity/geometry/generators.h"
 #include "asperity/render/law_registry.h"
+#include "asperity/render/touched_surface.h"
 #include "tests/render/fixtures.h"
 #include "tests/surface/custom_fields.h"
 
@@ -226,12 +227,13 @@ TEST(CustomSurfaceProxy, OtherLawsAreRefused) {
 
 /// F = stiffness depth^exponent of its own along the gradient, on what has a signed value.
 struct Power {
+  static constexpr LawFacts facts{.name = "mine", .title = "rises with a power of the depth", .source = "none"};
   double exponent = 2.0;
   double scale = 1e5;
   bool damped = false;
-  [[nodiscard]] CustomForce force(const TouchedSurface& surface, const Material&, const Vec3& probe, const Vec3&,
-                                  Seconds) const noexcept {
-    CustomForce answer;
+  [[nodiscard]] LawForce force(const TouchedSurface& surface, const Material&, const Vec3& probe, const Vec3&,
+                               Seconds) const noexcept {
+    LawForce answer;
     const FieldSample field = surface.eval(probe);
     if (!(field.value < 0.0)) return answer;
     answer.contact = true;
@@ -241,19 +243,21 @@ struct Power {
     answer.point = probe - field.value * answer.normal;
     answer.element = field.element;
     answer.damped = damped;
+    answer.spring = answer.force;
     return answer;
   }
 };
 
 /// Counts its own ticks and pushes up with as many newtons.
 struct Counting {
+  static constexpr LawFacts facts{.name = "counting", .title = "counts", .source = "none"};
   struct State {
     double ticks = 0.0;
     std::uint64_t more[7] = {1, 2, 3, 4, 5, 6, 7};
   };
-  [[nodiscard]] CustomForce force(const TouchedSurface&, const Material&, const Vec3& probe, const Vec3&, Seconds,
-                                  State& state) const noexcept {
-    CustomForce answer;
+  [[nodiscard]] LawForce force(const TouchedSurface&, const Material&, const Vec3& probe, const Vec3&, Seconds,
+                               State& state) const noexcept {
+    LawForce answer;
     state.ticks += 1.0;
     bool intact = true;
     for (std::uint64_t i = 0; i < 7; ++i) intact = intact && state.more[i] == i + 1;
@@ -265,12 +269,12 @@ struct Counting {
   }
 };
 
-template <class T>
-Law law_of(T law, const char* name = "mine") {
-  return std::make_shared<const CustomLaw>(must(CustomLaw::build(std::move(law), name)));
-}
+/// The same by another name.
+struct CountingAgain : Counting {
+  static constexpr LawFacts facts{.name = "counting-again", .title = "counts", .source = "none"};
+};
 
-TEST(CustomLaw, ItsForceIsRenderedOnEveryKindOfSurface) {
+TEST(LawOfOnesOwn, ItsForceIsRenderedOnEveryKindOfSurface) {
   const std::vector<Surface> surfaces = {
       surface_of(Ball{}), parametric_ball(0.03),
       std::make_shared<const MeshSurface>(TriangleIndex::build(must(TriangleMesh::build(icosphere(5, 0.03)))))};
@@ -278,7 +282,7 @@ TEST(CustomLaw, ItsForceIsRenderedOnEveryKindOfSurface) {
   for (const Surface& surface : surfaces) {
     SCOPED_TRACE(surface_kind(surface));
     Instance instance = instance_of(surface);
-    instance.law = law_of(Power{});
+    instance.law = Power{};
     instance.world_from_object.position = Vec3(0.1, 0.0, 0.0);
     const Scene scene = must(Scene::build({instance}, 0.0));
     const Vec3 origin = instance.world_from_object.position;
@@ -292,9 +296,9 @@ TEST(CustomLaw, ItsForceIsRenderedOnEveryKindOfSurface) {
   }
 }
 
-TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
+TEST(LawOfOnesOwn, KeepsAStateOfItsOwnForEachProbeAndLaw) {
   Instance instance = instance_of(surface_of(Ball{}));
-  instance.law = law_of(Counting{});
+  instance.law = Counting{};
   // It gives as it likes: the scene pays.
   SceneSettings settings;
   settings.change_power = settings.energy_capacity = 1e3;
@@ -309,19 +313,21 @@ TEST(CustomLaw, KeepsAStateOfItsOwnForEachProbeAndLaw) {
   ProxyState copy = first;
   EXPECT_EQ(touch(scene, copy, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 6.0);
   EXPECT_EQ(touch(scene, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 6.0);
-  // Another law, though of the same type, starts anew.
-  instance.law = law_of(Counting{});
+  // The same law goes on in another scene, and another one starts anew, though it has the same State.
+  instance.law = Counting{};
   const Scene next = must(Scene::build({instance}, settings));
-  const double force = touch(next, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z();
-  EXPECT_LE(force, 2.0);
+  EXPECT_EQ(touch(next, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 7.0);
+  instance.law = CountingAgain{};
+  const Scene other = must(Scene::build({instance}, settings));
+  EXPECT_LE(touch(other, first, Vec3(0.0, 0.0, 0.029)).wrench.force.z(), 2.0);
 }
 
-TEST(CustomLaw, MaterialsDampingAndFrictionComeOnTop) {
+TEST(LawOfOnesOwn, MaterialsDampingAndFrictionComeOnTop) {
   const auto felt = [](bool damped, double damping, bool friction) {
     Instance instance = instance_of(surface_of(Ball{}), Sides::front, friction ? 0.5 : 0.0);
     Power law;
     law.damped = damped;
-    instance.law = law_of(law);
+    instance.law = law;
     instance.material.damping = damping;
     instance.material.friction_named = friction;
     const Scene scene = must(Scene::build({instance}, 0.0));
@@ -344,20 +350,20 @@ TEST(CustomLaw, MaterialsDampingAndFrictionComeOnTop) {
   EXPECT_LE(rough.parts.friction.norm(), 0.5 * plain * 1.01);
 }
 
-TEST(CustomLaw, ForcesThatAreNoNumbersAreNone) {
+TEST(LawOfOnesOwn, ForcesThatAreNoNumbersAreNone) {
   Power law;
   law.scale = std::nan("");
   Instance instance = instance_of(surface_of(Ball{}));
-  instance.law = law_of(law);
+  instance.law = law;
   const Scene scene = must(Scene::build({instance}, 0.0));
   const ForceSample felt = poke(scene, Vec3(0.0, 0.0, 0.04), Vec3(0.0, 0.0, 0.029));
   EXPECT_TRUE(felt.wrench.force.isZero(0.0));
   EXPECT_FALSE(felt.flags.has(TickFlag::contact));
 }
 
-TEST(CustomLaw, TwoRunsAreEqualToTheBit) {
+TEST(LawOfOnesOwn, TwoRunsAreEqualToTheBit) {
   Instance instance = instance_of(surface_of(GyroidSheet{}), Sides::both);
-  instance.law = law_of(Power{});
+  instance.law = Power{};
   const Scene scene = must(Scene::build({instance}, 0.0));
   std::vector<Vec3> path;
   Wanderer wanderer(5, 1e-3, 0.027);
@@ -375,53 +381,89 @@ TEST(CustomLaw, TwoRunsAreEqualToTheBit) {
 
 /// A law for meshes alone, whose number has to be above 0.
 struct Picky : Power {
-  explicit Picky(NamedNumbers& numbers) { scale = numbers.get("scale", 100.0); }
-  [[nodiscard]] Status validate() const {
-    if (scale > 0.0) return success();
-    return Error{ErrorCode::bad_value, fmt_scale(), {}, "scale", "above 0"};
+  static constexpr LawFacts facts{.name = "picky", .title = "rises with a power of the depth", .source = "none"};
+  static void options(std::vector<Option>& rows) {
+    rows.push_back(option("scale", &Picky::scale, OptionType::number(Range::positive()), "force at a metre."));
+    rows.push_back(option("most", &Picky::most, OptionType::quantity(Dimension::force, Range::positive()), "limit."));
   }
-  [[nodiscard]] bool fits(const Surface& surface) const { return base_of(surface) != nullptr; }
-  [[nodiscard]] std::string fmt_scale() const { return "is " + std::to_string(scale); }
+  double scale = 100.0;
+  double most = 2.0;
+  [[nodiscard]] std::string lacks(const Instance& instance) const {
+    return base_of(instance.surface) != nullptr ? "" : "a mesh";
+  }
 };
 
-TEST(CustomLaw, RegisteredLawsHaveTheirNameAndTheirNumbers) {
-  ASSERT_TRUE(register_custom_law<Picky>("picky").ok());
+TEST(LawOfOnesOwn, RegisteredLawsHaveTheirNameAndTheirOptions) {
+  ASSERT_TRUE(register_law<Picky>().ok());
   const Law law = must(law_by_name("picky"));
   EXPECT_EQ(law_name(law), "picky");
-  EXPECT_FALSE(constrains(law));
-  EXPECT_DOUBLE_EQ(custom_of(law)->numbers().taken().at("scale"), 100.0);
-  const Law scaled = must(make_custom_law("picky", NamedNumbers({{"scale", 7.0}})));
-  EXPECT_DOUBLE_EQ(custom_of(scaled)->numbers().taken().at("scale"), 7.0);
-
-  const Result<Law> bad = make_custom_law("picky", NamedNumbers({{"scale", -1.0}}));
+  EXPECT_FALSE(law.constrains());
+  EXPECT_FALSE(is_built_in(law));
+  EXPECT_TRUE(is_built_in(ProxyLaw{}));
+  EXPECT_DOUBLE_EQ(law.as<Picky>()->scale, 100.0);
+  EXPECT_EQ(law.as<Counting>(), nullptr);
+  // A force is greater by the zoom in the scene that is shown; a number without a unit is not.
+  EXPECT_DOUBLE_EQ(magnified(law, 3.0).as<Picky>()->most, 6.0);
+  EXPECT_DOUBLE_EQ(magnified(law, 3.0).as<Picky>()->scale, 100.0);
+  Picky wrong;
+  wrong.scale = -1.0;
+  const Status bad = validate(Law(wrong));
   ASSERT_FALSE(bad.ok());
   EXPECT_EQ(bad.error().place, "scale");
-  const Result<Law> unread = make_custom_law("picky", NamedNumbers({{"scall", 1.0}}));
-  ASSERT_FALSE(unread.ok());
-  EXPECT_EQ(unread.error().code, ErrorCode::bad_key);
   const Result<Law> near = law_by_name("pickY-");
   ASSERT_FALSE(near.ok());
   EXPECT_NE(near.error().what.find("did you mean \"picky\"?"), std::string::npos) << near.error().what;
   EXPECT_NE(near.error().accepted.find("picky"), std::string::npos);
-  for (const char* taken : {"picky", "proxy", "mesostructure-literal", "Proxy", "a+b", ""})
-    EXPECT_FALSE(register_custom_law<Picky>(taken).ok()) << taken;
 }
 
-TEST(CustomLaw, ScenesRefuseWhatItDoesNotFit) {
-  NamedNumbers numbers;
+/// The same under a name of every kind that is no name, or taken, or with options that cannot be.
+template <int Which>
+struct Misnamed : Power {
+  static constexpr std::string_view names[] = {"picky", "proxy", "mesostructure-literal", "Proxy",    "a+b",
+                                               "",      "twice", "type-is-ours",          "helpless", "bad-default"};
+  static constexpr LawFacts facts{.name = names[Which], .title = "none", .source = "none"};
+  static void options(std::vector<Option>& rows) {
+    const OptionType number = OptionType::number(Range::positive());
+    const bool twice = facts.name == "twice";
+    rows.push_back(option(facts.name == "type-is-ours" ? "type" : "scale", &Misnamed::scale, number,
+                          facts.name == "helpless" ? "" : "some."));
+    if (twice) rows.push_back(rows.front());
+  }
+  double scale = 100.0;
+  [[nodiscard]] Status validate() const {
+    return facts.name == "bad-default" ? bad_value("is bad", "scale", "better ones") : success();
+  }
+};
+
+TEST(LawOfOnesOwn, WhatCannotBeALawIsRefused) {
+  ASSERT_TRUE(register_law<Picky>().ok());
+  const std::size_t before = law_names().size();
+  const auto refused = [](const Status& status) { return !status.ok() && !status.error().accepted.empty(); };
+  EXPECT_TRUE(refused(register_law<Misnamed<0>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<1>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<2>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<3>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<4>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<5>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<6>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<7>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<8>>()));
+  EXPECT_TRUE(refused(register_law<Misnamed<9>>()));
+  EXPECT_EQ(law_names().size(), before);
+}
+
+TEST(LawOfOnesOwn, ScenesRefuseWhatItDoesNotFit) {
   Instance instance = instance_of(surface_of(Ball{}));
-  instance.law = law_of(Picky(numbers), "of-meshes");
+  instance.law = Picky{};
   const Result<Scene> refused = Scene::build({instance}, 0.0);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::unsupported_pair);
-  EXPECT_NE(refused.error().what.find("of-meshes"), std::string::npos);
+  EXPECT_NE(refused.error().what.find("the law \"picky\" needs a mesh"), std::string::npos) << refused.error().what;
   instance.surface = floor_mesh();
   EXPECT_TRUE(Scene::build({instance}, 0.0).ok());
   const Result<Scene> ball = Scene::build({instance}, 1e-3);
   ASSERT_FALSE(ball.ok());
   EXPECT_EQ(ball.error().code, ErrorCode::unsupported_pair);
-  instance.law = std::shared_ptr<const CustomLaw>();
-  EXPECT_FALSE(Scene::build({instance}, 0.0).ok());
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ inline Law named(std::string_view name) {
 inline std::vector<std::string> relief_laws() {
   std::vector<std::string> names;
   for (const std::string& name : law_names()) {
-    if (!needs_field(named(name)) && !needs_potential(named(name))) names.push_back(name);
+    if (named(name).facts().needs < LawNeeds::field) names.push_back(name);
   }
   return names;
 }

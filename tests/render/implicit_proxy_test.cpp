@@ -336,7 +336,7 @@ TEST(ImplicitProxy, NormalPerturbationAndAnOffsetDoNotGoTogether) {
   const Result<Scene> scene = Scene::build({instance}, 0.0);
   ASSERT_FALSE(scene.ok());
   EXPECT_EQ(scene.error().code, ErrorCode::unsupported_pair);
-  EXPECT_NE(scene.error().accepted.find("offset"), std::string::npos);
+  EXPECT_NE(scene.error().what.find("implicit.offset"), std::string::npos) << scene.error().what;
 }
 
 }  // namespace

@@ -10,9 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/render/laws.h"
 #include "asperity/render/step.h"
 #include "tests/field/sparse_grids.h"
+#include "tests/render/asked_law.h"
 #include "tests/render/fixtures.h"
 
 namespace asperity::implicit {
@@ -43,11 +44,7 @@ struct Touch {
   SurfaceCache cache{};
 
   LawForce at(const Vec3& p, const Vec3& velocity = Vec3::Zero()) {
-    if constexpr (std::is_same_v<L, MagneticLaw>) {
-      return magnetic_force(law, *surface, material, p, velocity, dt, state, cache);
-    } else {
-      return virtual_contact_force(law, *surface, material, p, velocity, dt, state, cache);
-    }
+    return test::asked(law, surface, std::monostate(), material, p, velocity, dt, state, cache);
   }
 };
 using PointTouch = Touch<VirtualContactPointLaw>;

@@ -49,7 +49,10 @@ struct Rival {
   Material material{};
   Contact state{};
   SurfaceCache cache{};
-  LawForce at(const Vec3& p) { return normal_perturbation_force(*surface, material, p, state, cache); }
+  LawForce at(const Vec3& p) {
+    return test::asked(NormalPerturbationLaw{}, surface, std::monostate(), material, p, Vec3::Zero(), Seconds(1e-3),
+                       state, cache);
+  }
 };
 
 TEST(NormalPerturbation, ForceIsStiffnessTimesDepthAndHeightAlongTheTurnedNormal) {

@@ -135,7 +135,7 @@ TEST(GeneratedGeometry, stops_every_motion_where_the_dense_mesh_does) {
       // A motion that begins within the surface's touch may be taken for either.
       if (dense.view(hint).nearest(motion.from, infinity).distance < radius + 3.0 * dense.skin()) continue;
       GeneratedPatch patch;
-      patch.start(*relief, GeneratedGeometryLaw{n, i % 3 == 0 ? 0.0 : rng.uniform(3e-4, 2e-3)});
+      patch.start(*relief, LawFacets{n, i % 3 == 0 ? 0.0 : rng.uniform(3e-4, 2e-3)});
       const SweptHit expected = dense.view(hint).sweep(motion, radius, Sides::both);
       const SweptHit hit = patch.segment(motion, radius, Sides::both);
       if (!patch.complete()) {
@@ -169,7 +169,7 @@ TEST(GeneratedGeometry, touches_the_planes_that_the_dense_mesh_touches) {
     ContactSet expected;
     dense.view(hint).contacts(p, 0.0, Sides::both, expected);
     GeneratedPatch patch;
-    patch.start(*relief, GeneratedGeometryLaw{n, 0.0});
+    patch.start(*relief, LawFacets{n, 0.0});
     // The same thickness, so that both are asked the same.
     ContactSet found;
     patch.contacts(p, 2.0 * (dense.skin() - patch.skin()), Sides::both, found);
@@ -430,7 +430,7 @@ TEST(RivalScenes, need_a_coat) {
 TEST(RivalScenes, each_bad_option_is_named) {
   const std::pair<Law, const char*> bad[] = {
       {GeneratedGeometryLaw{0, 0.0}, "subdivisions"},
-      {GeneratedGeometryLaw{most_generated_subdivisions + 1, 0.0}, "subdivisions"},
+      {GeneratedGeometryLaw{GeneratedGeometryLaw::most_subdivisions + 1, 0.0}, "subdivisions"},
       {GeneratedGeometryLaw{8, -1.0}, "influence_radius"},
       {GeneratedGeometryLaw{8, std::nan("")}, "influence_radius"},
       {GeneratedGeometryLaw{8, infinity}, "influence_radius"},

@@ -37,7 +37,7 @@ inline RunReport run_report(const std::string& title, bool with_picture = false)
 inline std::vector<std::string> relief_laws() {
   std::vector<std::string> names;
   for (const std::string& name : law_names()) {
-    if (!needs_field(law_by_name(name).value()) && !needs_potential(law_by_name(name).value())) names.push_back(name);
+    if (law_by_name(name)->facts().needs < LawNeeds::field) names.push_back(name);
   }
   return names;
 }

@@ -233,7 +233,7 @@ TEST(PotentialTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
     const Law law = law_by_name(name).value();
     for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
       for (const double radius : {0.0, 0.002}) {
-        if (radius > 0.0 && !constrains(law)) continue;
+        if (radius > 0.0 && !law.constrains()) continue;
         const Scene scene = potential_scene(law, reconstruction, radius);
         expect_clean(name, radius > 0.0 ? 300 : 4000, radius, [&](int) -> const Scene& { return scene; });
       }
@@ -249,7 +249,7 @@ TEST(VolumeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
     const Law law = law_by_name(name).value();
     for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
       for (const double radius : {0.0, 0.002}) {
-        if (radius > 0.0 && needs_field(law)) continue;
+        if (radius > 0.0 && law.facts().needs == LawNeeds::field) continue;
         const Scene scene = volume_scene(law, reconstruction, radius, 0.03);
         const Scene other = volume_scene(law, reconstruction, radius, 0.0305);
         // The threshold changes under the probe now and then.
@@ -361,7 +361,7 @@ Scene changing_scene(const Law& law, double zoom, double height) {
   instance.sides = Sides::front;
   instance.material.damping = 1.0;
   instance.material.static_friction = instance.material.dynamic_friction = 0.3;
-  instance.material.stickiness = std::holds_alternative<ProxyLaw>(law) ? 0.1 : 0.0;
+  instance.material.stickiness = law.is<ProxyLaw>() ? 0.1 : 0.0;
   instance.motion.velocity.angular = Vec3(0.0, 0.5, 0.1);
   instance.motion.horizon = Seconds(100.0);
   instance.surface =
@@ -394,7 +394,7 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   const Law law = law_by_name(GetParam()).value();
   for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
     for (const double radius : {0.0, 0.002}) {
-      if (radius > 0.0 && !constrains(law)) continue;
+      if (radius > 0.0 && !law.constrains()) continue;
       const Scene scene = scene_with(law, structure, radius);
       ProxyState state;
       ProxyCache cache;
@@ -428,7 +428,7 @@ std::vector<std::string> laws_of_meshes() {
   std::vector<std::string> names;
   for (const std::string& name : law_names()) {
     const Law law = law_by_name(name).value();
-    if (!needs_field(law) && !needs_potential(law)) names.push_back(name);
+    if (law.facts().needs < LawNeeds::field) names.push_back(name);
   }
   return names;
 }

@@ -247,7 +247,7 @@ class TextureReader {
     if (!coated_ || host_.mesh == nullptr) {
       reader_.fail("source", "is \"coat\", and the surface has none", "\"features\", or a mesh with a coat",
                    ErrorCode::unsupported_pair);
-    } else if (!std::holds_alternative<GodObjectLaw>(law_)) {
+    } else if (!law_.feels_mesh_alone()) {
       // It would be felt twice (formulation, amendment 8).
       reader_.fail("source", fmt::format("is \"coat\", whose relief the law \"{}\" feels already", law_name(law_)),
                    "\"features\", or the law \"god-object\", which feels the bare mesh", ErrorCode::unsupported_pair);
@@ -344,7 +344,7 @@ class TextureReader {
     if (host_.parametric != nullptr) return success();
     if (mapping == IntermediateSurface::box)
       return not_geometry("and a box's six planes make no one map", "or another mapping");
-    if (std::holds_alternative<GodObjectLaw>(law_))
+    if (law_.feels_mesh_alone())
       return not_geometry(fmt::format("which the law \"{}\" does not feel", law_name(law_)), "or the law \"proxy\"");
     return success();
   }

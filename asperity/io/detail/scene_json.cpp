@@ -173,4 +173,8 @@ void ObjectReader::take(std::string_view key, ObjectReader&& child) {
   }
 }
 
+void write_bound(SceneJson& json, const SceneObject& object, std::type_index type, const void* settings) {
+  for (const auto& [row, value] : object.bound(type, settings, json)) json[row->key] = json_of(value);
+}
+
 }  // namespace asperity

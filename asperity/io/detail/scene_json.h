@@ -74,6 +74,8 @@ class ObjectReader {
   void read_all(S& settings, bool given = false) {
     read_bound(typeid(S), &settings, given);
   }
+  /// The same where the type is known at run time.
+  void read_bound(std::type_index type, void* settings, bool given = false);
 
   /// Writes the value that was decided for `key` into the canonical copy.
   void write(std::string_view key, SceneJson value) { canonical_[std::string(key)] = std::move(value); }
@@ -100,7 +102,6 @@ class ObjectReader {
 
  private:
   OptionValue value_at(std::string_view key, const SceneJson& value);
-  void read_bound(std::type_index settings, void* into, bool given);
 
   const SceneJson* json_;
   const SceneObject* object_;
@@ -111,9 +112,11 @@ class ObjectReader {
 
 /// The settings whose rows hold in `json`, as they stand in a canonical copy, added to it. What a row would not take
 /// stands for nothing, and is not written. [any]
+void write_bound(SceneJson& json, const SceneObject& object, std::type_index type, const void* settings);
+/// The same. [any]
 template <class S>
 void write_settings(SceneJson& json, const SceneObject& object, const S& settings) {
-  for (const auto& [row, value] : object.bound(typeid(S), &settings, json)) json[row->key] = json_of(value);
+  write_bound(json, object, typeid(S), &settings);
 }
 
 }  // namespace asperity

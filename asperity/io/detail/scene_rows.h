@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "asperity/io/detail/scene_table.h"
-#include "asperity/surface/stitching.h"
 
 namespace asperity::scene_rows {
 
@@ -63,27 +62,6 @@ Type heights_source();
 /// "height_map" and what its grey means. `shares`: heights may be shares of a mesh's mean edge. `each` adds what all of
 /// these rows have in common.
 void heights(SceneObject& row, bool shares, const std::function<void(Option&)>& each);
-/// "blend", which laws and stitching have; an image is left to whoever reads files. [any]
-Type blend_type();
-inline constexpr const char* blend_help =
-    "Weight over the band. An array holds weights from 0 to 1, outside to inside, evenly spaced.";
-/// Binds it to a blend and its weights. [any]
-template <class S>
-auto bound_blend(Blend S::*blend, std::vector<double> S::*weights) {
-  return [=](Option& row) {
-    row.of(blend);
-    row.get = [=](const void* of) {
-      const S& settings = *static_cast<const S*>(of);
-      return settings.*blend == Blend::image ? OptionValue(settings.*weights) : to_option(settings.*blend);
-    };
-    row.set = [=](void* of, const OptionValue& value) {
-      S& settings = *static_cast<S*>(of);
-      const auto* given = std::get_if<std::vector<double>>(&value);
-      if (given != nullptr) settings.*weights = *given;
-      settings.*blend = given != nullptr ? Blend::image : from_option<Blend>(value);
-    };
-  };
-}
 /// "units", "fit" and "pose", which surfaces and effects have. [any]
 void placing(SceneObject& row, std::vector<std::pair<Test, std::string>> unfit);
 

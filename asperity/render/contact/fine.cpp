@@ -265,7 +265,7 @@ bool resists(const Instance& instance, const Material& material) noexcept {
 }  // namespace
 
 bool proxy_holds_friction(const Instance& instance) noexcept {
-  if (!std::holds_alternative<ProxyLaw>(instance.law)) return false;
+  if (instance.law.facts().proxy != LawProxy::surface) return false;
   if (instance.fine != nullptr && (instance.fine->has_texture() || instance.fine->shapes_friction())) return false;
   if (lay_of(instance) != nullptr) return false;
   const FrictionLaw& law = instance.material.friction;
@@ -274,7 +274,7 @@ bool proxy_holds_friction(const Instance& instance) noexcept {
 }
 
 bool adds_friction(const Instance& instance) noexcept {
-  if (std::holds_alternative<ProxyLaw>(instance.law)) return !proxy_holds_friction(instance);
+  if (instance.law.facts().proxy == LawProxy::surface) return !proxy_holds_friction(instance);
   return instance.material.friction_named || (instance.fine != nullptr && instance.fine->shapes_friction());
 }
 
@@ -359,7 +359,7 @@ Status check_fine(const Instance& instance, const std::string& place) {
     if (relief_of(instance) == nullptr)
       return refuse(fmt::format("takes its heights from a coat, and \"{}\" has none", instance.name),
                     "\"features\", or a coat on a mesh");
-    if (!std::holds_alternative<GodObjectLaw>(instance.law))
+    if (!instance.law.feels_mesh_alone())
       return refuse(
           fmt::format("takes its heights from a coat, which the law \"{}\" feels already", law_name(instance.law)),
           "the law \"god-object\", which feels the bare mesh");

@@ -1,7 +1,6 @@
 #pragma once
 // Friction and texture of one contact, on top of what constrains it (heterogeneous-features-2008, eq. 1).
 
-#include "asperity/render/laws/forces.h"
 #include "asperity/render/local_material.h"
 
 namespace asperity {

@@ -172,11 +172,11 @@ class GeneratedPatch::BlockSearch {
   double level_ = 0.0;
 };
 
-void GeneratedPatch::start(const ReliefSurface& surface, const GeneratedGeometryLaw& law) noexcept {
+void GeneratedPatch::start(const ReliefSurface& surface, const LawFacets& facets) noexcept {
   surface_ = &surface;
-  subdivisions_ = law.subdivisions;
+  subdivisions_ = facets.subdivisions;
   facet_ = surface.base().mesh().mean_edge() / subdivisions_;
-  influence_ = law.influence_radius > 0.0 ? law.influence_radius : influence_in_facets * facet_;
+  influence_ = facets.influence_radius > 0.0 ? facets.influence_radius : influence_in_facets * facet_;
   fitted_ = infinity;
   tolerance_ = ContactTolerance::of(facet_, surface.bounds());
   complete_ = true;

@@ -4,7 +4,7 @@
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/geometry/triangle_contact.h"
-#include "asperity/render/laws.h"
+#include "asperity/render/law_facts.h"
 #include "asperity/surface/relief/view.h"
 
 namespace asperity {
@@ -16,7 +16,7 @@ namespace asperity {
 class GeneratedPatch {
  public:
   GeneratedPatch() noexcept {}  // NOLINT: the buffers stay uninitialised on purpose
-  void start(const ReliefSurface& surface, const GeneratedGeometryLaw& law) noexcept;
+  void start(const ReliefSurface& surface, const LawFacets& facets) noexcept;
 
   /// First touch of a ball moving among the facets. Where the buffer cannot hold what is around it, the motion is
   /// stopped there. [servo]

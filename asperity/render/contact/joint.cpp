@@ -34,10 +34,10 @@ void JointSolve::add(Touched& touch) noexcept {
   entry.touch = &touch;
   entry.smooth = touch.facts->smooth;
   entry.near = touch.contact->first();
-  if (const auto* law = std::get_if<GeneratedGeometryLaw>(&touch.instance->law)) {
+  if (touch.facts->facets) {
     // As many patches as contacts: never full.
     entry.patch = patches_->emplace_back();
-    entry.patch->start(*relief_of(*touch.instance), *law);
+    entry.patch->start(*relief_of(*touch.instance), touch.instance->law.facets());
     entry.skin = entry.patch->skin();
   } else {
     entry.skin = on_view(touch.view, [](const auto& view) { return view.skin(); });
@@ -458,46 +458,6 @@ void JointSolve::remember_places(std::size_t index, const ConstraintSolution& so
   if (state.places.empty() && entry.smooth && entry.near.known()) state.places.push_back(entry.near);
 }
 
-namespace {
-
-/// Normal of the relief as it is rendered: blended over edges where faces disagree, in the base face's plane.
-Vec3 blended_normal(const ReliefSurface& relief, const Foot& contact) noexcept {
-  const BarycentricFrame frame = barycentric_frame(relief.base().mesh(), contact.element);
-  const HeightJet jet = relief.height(relief.frame(contact.element), contact.at[1], contact.at[2]);
-  return (frame.normal - jet.u * frame.gradient[1] - jet.v * frame.gradient[2]).normalized();
-}
-
-/// Direction that force shading turns a contact's force into: the coat's normal map, or the smoothed mesh, on the side
-/// touched. Object frame.
-Vec3 shading_normal(const Instance& instance, Formulation formulation, const Foot& contact) noexcept {
-  const TriangleMesh& mesh = constraint_mesh(instance)->mesh();
-  Vec3 normal = Vec3::Zero();
-  if (const ReliefSurface* relief = relief_of(instance)) {
-    const bool given = relief->coat().maps_on(contact.element).has_normal_map();
-    normal = formulation == Formulation::consistent && !given ? blended_normal(*relief, contact)
-                                                              : relief->coat_sample(contact.element, contact.at).normal;
-  } else {
-    normal = interpolated_normal(mesh, contact.element, contact.at);
-  }
-  return contact.normal.dot(mesh.face_normal(contact.element)) < 0.0 ? Vec3(-normal) : normal;
-}
-
-}  // namespace
-
-void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact, LawForce& answer) noexcept {
-  const Vec3 shading = touch.turned(shading_normal(*touch.instance, law.formulation, contact));
-  if (law.formulation == Formulation::literal) {
-    answer.normal = shading;
-    answer.force = answer.force.norm() * shading;
-    return;
-  }
-  // The slope that the normal stands for, times the push.
-  constexpr double least_rise = 0.1;
-  const double rise = std::max(least_rise, shading.dot(answer.normal));
-  answer.turns = true;
-  answer.turn = answer.force.norm() / rise * (shading - shading.dot(answer.normal) * answer.normal);
-}
-
 LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
   LawForce answer;
@@ -526,7 +486,7 @@ LawForce owner_force(const Touched& touch, const Material& material, std::size_t
     answer.force += material.stiffness * rest;
   }
   answer.spring = answer.force;
-  if (const auto* law = std::get_if<ForceShadingLaw>(&touch.instance->law)) shade(touch, *law, plane->contact, answer);
+  finish_by_law(touch, plane->contact, answer);
   if (strongest == strongest_of_all) {
     const Vec3 friction = material.stiffness * (goal - probe.pose.position);
     answer.force += friction;

@@ -6,7 +6,6 @@
 #include "asperity/render/contact/generated_geometry.h"
 #include "asperity/render/contact/planes.h"
 #include "asperity/render/felt.h"
-#include "asperity/render/laws/forces.h"
 
 namespace asperity {
 
@@ -164,11 +163,8 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
   return solution;
 }
 
-/// Turns a contact's force as force shading does; its consistent form puts the lateral force into `answer.turn`.
-/// [servo]
-void shade(const Touched& touch, const ForceShadingLaw& law, const Foot& contact, LawForce& answer) noexcept;
 /// Force of one owner among solved planes, world frame: its share of the spring from `goal`, and, for the owner that
-/// pushes most, what friction holds (from the goal on to the probe); shaded and damped as its law and material say.
+/// pushes most, what friction holds (from the goal on to the probe); finished and damped as its law and material say.
 /// [servo]
 LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept;

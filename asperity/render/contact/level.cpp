@@ -37,7 +37,7 @@ double ball_level(const Instance& instance, const Scene& scene) noexcept {
   const ImplicitSurface* implicit = implicit_of(instance.surface);
   const double radius = scene.probe_radius();
   if (implicit == nullptr || implicit->textured() || radius == 0.0) return 0.0;
-  if (!std::holds_alternative<ProxyLaw>(instance.law) || scene.instances().size() != 1) return 0.0;
+  if (instance.law.facts().proxy != LawProxy::surface || scene.instances().size() != 1) return 0.0;
   // Level sets of the potential turn their front to the outside only.
   if (instance.sides.value_or(Sides::front) != Sides::front || implicit->offset() + radius > implicit->reach_outside())
     return 0.0;

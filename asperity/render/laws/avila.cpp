@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/core/option.h"
+#include "asperity/render/laws/avila.h"
+#include "asperity/render/touched_surface.h"
 
 namespace asperity {
 
@@ -42,18 +44,32 @@ LawForce consistent_force(const AvilaLaw& law, const IsoView& view, double band,
   answer.stiffness = law.largest_force * slope / band;
   answer.force = answer.spring - law.retarding * (1.0 + share) * velocity;
   answer.penetration = depth / slope;
+  answer.stored = 0.5 * law.largest_force * share * answer.penetration;
   answer.point = probe + answer.penetration * answer.normal;
   return answer;
 }
 
 }  // namespace
 
-double avila_band(const AvilaLaw& law, const IsoSurface& surface, const Material& material) noexcept {
-  return law.band > 0.0 ? law.band : law.largest_force * surface.typical_slope() / material.stiffness;
+double AvilaLaw::layer(const IsoSurface& surface, const Material& material) const noexcept {
+  return band > 0.0 ? band : largest_force * surface.typical_slope() / material.stiffness;
 }
 
-LawForce avila_force(const AvilaLaw& law, const IsoSurface& surface, const IsoView& view, const Material& material,
-                     const Vec3& probe, const Vec3& velocity, Contact& contact) noexcept {
+void AvilaLaw::options(std::vector<Option>& rows) {
+  using L = AvilaLaw;
+  rows.push_back(option("band", &L::band, OptionType::number(Range::not_negative()),
+                        "width of the layer that pushes, in the field's unit, from the threshold inwards; 0 chooses it "
+                        "by the stiffness."));
+  rows.push_back(option("largest_force", &L::largest_force, OptionType::quantity(Dimension::force, Range::positive()),
+                        "force at the layer's end."));
+  rows.push_back(option("retarding", &L::retarding, OptionType::quantity(Dimension::damping, Range::not_negative()),
+                        "resistance against motion within."));
+}
+
+LawForce AvilaLaw::force(const TouchedSurface& surface, const Material& material, const Vec3& probe,
+                         const Vec3& velocity, Seconds) const noexcept {
+  const IsoView& view = surface.touch().iso();
+  Contact& contact = *surface.touch().contact;
   contact.asked = true;
   FieldJet jet;
   if (!probe.allFinite() || !view.field->contains(probe) || !view.sample(probe, jet) || !std::isfinite(jet.value)) {
@@ -62,11 +78,11 @@ LawForce avila_force(const AvilaLaw& law, const IsoSurface& surface, const IsoVi
   }
   const bool outside = view.sigma * (jet.value - view.threshold) >= 0.0;
   contact.seen_outside = contact.seen_outside || outside;
-  const double band = avila_band(law, surface, material);
+  const double width = layer(*iso_of(surface.instance().surface), material);
   // The printed method has no memory: whoever starts within the layer is pushed at once.
-  if (law.formulation == Formulation::literal) return literal_force(law, view, band, jet, probe, velocity);
+  if (formulation == Formulation::literal) return literal_force(*this, view, width, jet, probe, velocity);
   if (!contact.seen_outside) return {};
-  return consistent_force(law, view, band, jet, probe, velocity);
+  return consistent_force(*this, view, width, jet, probe, velocity);
 }
 
 }  // namespace asperity

@@ -7,14 +7,16 @@
 #include <cstdlib>
 #include <limits>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/core/option.h"
+#include "asperity/render/laws/cross_uncross.h"
+#include "asperity/render/touched_surface.h"
 
 namespace asperity {
 
 namespace {
 
 /// What the law remembers, while it is asked.
-struct Crossing : CrossingMemory {
+struct Crossing : CrossUncrossLaw::State {
   Vec3 point;   ///< crossed, or held to
   Vec3 normal;  ///< the gradient saved there
   bool started = false;
@@ -327,21 +329,32 @@ LawForce consistent_force(const CrossUncrossLaw& law, const IsoView& view, doubl
   answer.point = state.point;
   answer.normal = state.normal;
   answer.penetration = (state.point - probe).norm();
+  answer.stored = 0.5 * stiffness * (state.point - probe).squaredNorm();
   return answer;
 }
 
 }  // namespace
 
-LawForce cross_uncross_force(const CrossUncrossLaw& law, const IsoView& view, const Material& material,
-                             const Vec3& probe, const Vec3& velocity, Contact& contact) noexcept {
+void CrossUncrossLaw::options(std::vector<Option>& rows) {
+  using L = CrossUncrossLaw;
+  rows.push_back(option("retarding", &L::retarding, OptionType::quantity(Dimension::damping, Range::not_negative()),
+                        "resistance against motion within."));
+  rows.push_back(option("reach", &L::reach, OptionType::quantity(Dimension::length, Range::not_negative()),
+                        "how far along the gradient the surface is looked for; 0: 64 cells.")
+                     .of_printed_form("which looks as far as it has to"));
+}
+
+LawForce CrossUncrossLaw::force(const TouchedSurface& surface, const Material& material, const Vec3& probe,
+                                const Vec3& velocity, Seconds, State& memory) const noexcept {
   if (!probe.allFinite()) return {};
-  CrossingMemory& memory = contact.memory<CrossingMemory>();
+  const IsoView& view = surface.touch().iso();
+  Contact& contact = *surface.touch().contact;
   Crossing state{memory, contact.first().at, contact.surface.normal, contact.asked, contact.seen_outside};
   LawForce answer;
-  if (law.formulation == Formulation::consistent) {
-    answer = consistent_force(law, view, material.stiffness, probe, velocity, state);
+  if (formulation == Formulation::consistent) {
+    answer = consistent_force(*this, view, material.stiffness, probe, velocity, state);
   } else if (state.started) {
-    answer = literal_force(law, view, material.stiffness, probe, velocity, state);
+    answer = literal_force(*this, view, material.stiffness, probe, velocity, state);
   } else {
     state.value = value_at(view, probe);
   }

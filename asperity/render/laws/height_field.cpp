@@ -1,8 +1,12 @@
 // Height-field rendering over base triangles: haptic-textures-2005, 3.3, and Algorithm 1 of hrm-2010.
 
+#include "asperity/render/laws/height_field.h"
+
 #include <cmath>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/core/option.h"
+#include "asperity/render/contact/shell_contact.h"
+#include "asperity/render/touched_surface.h"
 
 namespace asperity {
 
@@ -85,58 +89,18 @@ LawForce consistent_force(const HeightFieldLaw& law, const ReliefView& view, dou
 
 }  // namespace
 
-LawForce height_field_force(const HeightFieldLaw& law, const ReliefView& view, const Material& material,
-                            const Vec3& probe, Contact& contact) noexcept {
-  return law.formulation == Formulation::literal
-             ? literal_force(law, view.surface(), material.stiffness, probe, view.moment())
-             : consistent_force(law, view, material.stiffness, probe, contact);
+void HeightFieldLaw::options(std::vector<Option>& rows) {
+  rows.push_back(option("edge_taper", &HeightFieldLaw::edge_taper, OptionType::number({0.0, 1.0 / 3.0}),
+                        "share of each triangle over which heights fall to 0 towards its edges; 0 turns it off.")
+                     .or_else("0; 0.05 for height-field-literal"));
 }
 
-ShellContact shell_contact(const ReliefView& view, const Vec3& probe) noexcept {
-  const MeshSurface& base = view.surface().base();
-  ShellContact contact;
-  contact.frame = view.locate(probe, contact.place);
-  // A rim needs a foot on it, and there is a foot wherever there is a triangle.
-  if (base.mesh().report().closed()) {
-    contact.found = true;
-    return contact;
-  }
-  const Foot nearest = view.nearest_base(probe);  // from the patch that locating just used
-  contact.found = nearest.found();
-  if (contact.found) contact.beyond_rim = beyond_rim(base.mesh(), nearest, probe, view.skin());
-  return contact;
-}
-
-LawForce potential_contact(double value, const Vec3& gradient, double height, std::uint32_t element, bool beyond_rim,
-                           double stiffness, const Vec3& probe, Contact& contact) noexcept {
-  LawForce answer;
-  answer.height = height;
-  answer.element = element;
-  if (beyond_rim) {
-    contact.seen_outside = false;
-    return answer;
-  }
-  if (value >= 0.0) {
-    contact.seen_outside = true;
-    return answer;
-  }
-  const double steepness = gradient.norm();
-  if (!contact.seen_outside || steepness == 0.0) return answer;
-  answer.contact = true;
-  answer.force = answer.spring = -stiffness * value * gradient;
-  answer.stiffness = stiffness * steepness * steepness;
-  answer.stored = 0.5 * stiffness * value * value;
-  answer.normal = gradient / steepness;
-  answer.penetration = -value;
-  answer.point = probe - value / steepness * answer.normal;
-  return answer;
-}
-
-Vec3 with_damping(const Vec3& force, const Vec3& normal, const Vec3& velocity, double damping) noexcept {
-  if (damping == 0.0) return force;
-  const double push = force.dot(normal);
-  const double damped = std::max(0.0, push - damping * velocity.dot(normal));
-  return force + (damped - push) * normal;
+LawForce HeightFieldLaw::force(const TouchedSurface& surface, const Material& material, const Vec3& probe, const Vec3&,
+                               Seconds) const noexcept {
+  const ReliefView& view = surface.touch().relief();
+  return formulation == Formulation::literal
+             ? literal_force(*this, view.surface(), material.stiffness, probe, view.moment())
+             : consistent_force(*this, view, material.stiffness, probe, *surface.touch().contact);
 }
 
 }  // namespace asperity

@@ -1,9 +1,13 @@
 // Mesostructure-blended rendering: Algorithm 2 of hrm-2010.
 
+#include "asperity/render/laws/mesostructure.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/render/contact/shell_contact.h"
+#include "asperity/render/touched_surface.h"
+#include "asperity/surface/blend_option.h"
 
 namespace asperity {
 
@@ -100,11 +104,29 @@ LawForce consistent_force(const ReliefView& view, double stiffness, const Vec3& 
 
 }  // namespace
 
-LawForce mesostructure_force(const MesostructureLaw& law, const ReliefView& view, const Material& material,
-                             const Vec3& probe, Contact& contact) noexcept {
-  return law.formulation == Formulation::literal
-             ? literal_force(law, view.surface(), material.stiffness, probe, view.moment())
-             : consistent_force(view, material.stiffness, probe, contact);
+void MesostructureLaw::options(std::vector<Option>& rows) {
+  using L = MesostructureLaw;
+  const char* why = "the coat's \"stitching\" says how it blends";
+  rows.push_back(option("rho", &L::rho, OptionType::number({0.0, 1.0 / 3.0, true}),
+                        "width of the blended band around edges in barycentric coordinates.")
+                     .of_printed_form(why));
+  rows.push_back(blend_option(&L::blend, &L::blend_map).of_printed_form(why));
+  rows.push_back(option("test_neighbours", &L::test_neighbours, OptionType::boolean(),
+                        "every neighbouring prism that holds the probe has a say (hrm-2010, 4.2), not those in the "
+                        "band alone.")
+                     .of_printed_form(why));
+}
+
+Status MesostructureLaw::validate() const {
+  return asperity::validate(Stitching{FoldMode::keep, blend, rho, blend_map});
+}
+
+LawForce MesostructureLaw::force(const TouchedSurface& surface, const Material& material, const Vec3& probe,
+                                 const Vec3&, Seconds) const noexcept {
+  const ReliefView& view = surface.touch().relief();
+  return formulation == Formulation::literal
+             ? literal_force(*this, view.surface(), material.stiffness, probe, view.moment())
+             : consistent_force(view, material.stiffness, probe, *surface.touch().contact);
 }
 
 }  // namespace asperity

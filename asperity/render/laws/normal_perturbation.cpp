@@ -1,14 +1,25 @@
 // Texture felt as a turned normal: the rival of Fig. 10a (hybrid-surface-2004; Ho, Basdogan and Srinivasan 1999).
 
+#include "asperity/render/laws/normal_perturbation.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/render/laws/forces.h"
+#include "asperity/render/touched_surface.h"
 
 namespace asperity {
 
-LawForce normal_perturbation_force(const ImplicitSurface& surface, const Material& material, const Vec3& probe,
-                                   Contact& contact, SurfaceCache& cache) noexcept {
+std::string NormalPerturbationLaw::lacks(const Instance& instance) const {
+  const ImplicitSurface& surface = *implicit_of(instance.surface);
+  if (surface.mesh() == nullptr || !surface.textured()) return "a mesh with a texture (implicit.texture)";
+  return surface.offset() > 0.0 ? "one without implicit.offset" : "";
+}
+
+LawForce NormalPerturbationLaw::force(const TouchedSurface& touched, const Material& material, const Vec3& probe,
+                                      const Vec3&, Seconds) const noexcept {
+  const ImplicitSurface& surface = touched.touch().implicit();
+  Contact& contact = *touched.touch().contact;
+  SurfaceCache& cache = *touched.touch().cache;
   contact.asked = true;
   const MeshSurface* base = surface.mesh();
   if (base == nullptr || !probe.allFinite()) return {};
@@ -49,6 +60,7 @@ LawForce normal_perturbation_force(const ImplicitSurface& surface, const Materia
   answer.force = material.stiffness * depth * answer.normal;
   answer.point = foot.point + height * face;
   answer.penetration = depth;
+  answer.stored = 0.5 * material.stiffness * depth * depth;
   return answer;
 }
 

@@ -1,12 +1,13 @@
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "asperity/render/contact/fine.h"
 #include "asperity/render/contact/level.h"
-#include "asperity/render/custom_law.h"
 #include "asperity/render/local_material.h"
 #include "asperity/render/stages/tick.h"
+#include "asperity/render/touched_surface.h"
 
 namespace asperity {
 
@@ -36,58 +37,29 @@ void add_contact(Tick& tick, const Touched& touch, const LawForce& law) noexcept
   out.contact.places = touch.contact->surface.places;
 }
 
-/// What the law of an instance without a proxy answers, object frame. `material`: felt at the probe.
-struct AskLaw {
-  const Touched& touch;
-  const Material& material;
-  const Vec3& probe;
-  const Vec3& velocity;
-  Seconds dt;
+/// What a program's own law has answered, or nothing where that is no number.
+void check(LawForce& answer) noexcept {
+  const bool finite = std::isfinite(answer.force.sum() + answer.point.sum() + answer.normal.sum() +
+                                    answer.spring.sum() + answer.penetration + answer.push + answer.stiffness);
+  if (!finite) answer.contact = false;
+  if (!std::isfinite(answer.height)) answer.height = 0.0;
+  if (!answer.damped) answer.spring = answer.force;
+  answer.keeps = !answer.stored;
+  answer.local = 0.0;
+}
 
-  LawForce operator()(const HeightFieldLaw& law) const noexcept {
-    return height_field_force(law, relief(), material, probe, *touch.contact);
-  }
-  LawForce operator()(const MesostructureLaw& law) const noexcept {
-    return mesostructure_force(law, relief(), material, probe, *touch.contact);
-  }
-  LawForce operator()(const AvilaLaw& law) const noexcept {
-    return avila_force(law, *iso_of(touch.instance->surface), iso(), material, probe, velocity, *touch.contact);
-  }
-  LawForce operator()(const CrossUncrossLaw& law) const noexcept {
-    return cross_uncross_force(law, iso(), material, probe, velocity, *touch.contact);
-  }
-  LawForce operator()(const VirtualContactPointLaw& law) const noexcept {
-    return virtual_contact_force(law, implicit(), own(), probe, velocity, dt, *touch.contact, *touch.cache);
-  }
-  LawForce operator()(const MagneticLaw& law) const noexcept {
-    return magnetic_force(law, implicit(), own(), probe, velocity, dt, *touch.contact, *touch.cache);
-  }
-  LawForce operator()(const NormalPerturbationLaw&) const noexcept {
-    return normal_perturbation_force(implicit(), material, probe, *touch.contact, *touch.cache);
-  }
-  LawForce operator()(const std::shared_ptr<const CustomLaw>& law) const noexcept {
-    return law->force(*touch.instance, touch.view, material, probe, velocity, dt, *touch.contact);
-  }
-  // What moves the proxy is not asked.
-  template <class Other>
-  LawForce operator()(const Other&) const noexcept {
-    return {};
-  }
-
-  [[nodiscard]] const ReliefView& relief() const noexcept { return *std::get_if<ReliefView>(&touch.view); }
-  [[nodiscard]] const IsoView& iso() const noexcept { return *std::get_if<IsoView>(&touch.view); }
-  [[nodiscard]] const ImplicitSurface& implicit() const noexcept { return *implicit_of(touch.instance->surface); }
-  /// Where friction is a force of its own the contact point is not held back as well.
-  [[nodiscard]] Material own() const noexcept {
-    Material mine = touch.instance->material;
-    mine.friction_named = touch.facts->adds_friction;
-    return mine;
-  }
-};
-
+/// What the law of an instance without a proxy answers, object frame. `material`: felt at the probe, or the instance's
+/// own for a law that looks it up itself.
 LawForce ask(const Touched& touch, const Material& material, const Vec3& probe, const Vec3& velocity,
              Seconds dt) noexcept {
-  return std::visit(AskLaw{touch, material, probe, velocity, dt}, touch.instance->law);
+  const Law& law = touch.instance->law;
+  Contact& contact = *touch.contact;
+  // Others keep them: what was before the first tick in reach is known once a law has been asked.
+  if (touch.facts->custom) contact.seen_outside = contact.asked = true;
+  LawForce answer =
+      law.kind().force(law.settings(), TouchedSurface(touch), material, probe, velocity, dt, contact.law.memory);
+  if (touch.facts->custom) check(answer);
+  return answer;
 }
 
 /// Velocity of the probe over a moving instance (m/s, world).
@@ -124,12 +96,22 @@ Giver cause_of(const Tick& tick, const Touched& touch, float before, float now) 
   if (tick.changed) return Giver::change;
   if (touch.moved) return Giver::motion;
   if (tick.surfaces_moved && touch.facts->volume) return Giver::level;
-  if (std::holds_alternative<std::shared_ptr<const CustomLaw>>(touch.instance->law)) return Giver::custom;
+  if (touch.facts->custom) return Giver::custom;
   return before > 0.0F && now != before ? Giver::stiffness : Giver::spring;
 }
 
 double stiffness_of(const LawForce& law, const Material& material) noexcept {
   return law.stiffness > 0.0 ? law.stiffness : material.stiffness;
+}
+
+/// The spring of a program's own law, as far as what that says of its energy can be believed: no more than the
+/// material's stiffness but where it is seen, and no less energy than so strong a spring holds.
+Spring believed(const LawForce& law, const Material& material, const HeldForce& held, const Vec3& moved) noexcept {
+  const double way = moved.norm();
+  const double seen = way > 0.0 ? 2.0 * (law.spring - held.force).norm() / way : 0.0;
+  Spring spring{law.spring, std::min(stiffness_of(law, material), std::max(material.stiffness, seen)), {}, law.keeps};
+  if (law.stored) spring.stored = std::max(std::isfinite(*law.stored) ? *law.stored : 0.0, spring.least());
+  return spring;
 }
 
 /// Tells that something else is rendered than there would be; what is rounding is not told.
@@ -148,21 +130,21 @@ void soften(Tick& tick, double share, LawForce& law) noexcept {
   if (law.turns) law.turn *= share;
 }
 
-/// Pays for all that a contact gives beside its spring, which is paid for already. World frame.
-void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
+/// Pays for all that a contact gives beside its spring, which is paid for already, and of which `rendered` is the
+/// share. World frame.
+void settle_loose(Tick& tick, const Touched& touch, double rendered, LawForce& law) noexcept {
   EnergyAccount& account = tick.state.account;
   Contact& contact = *touch.contact;
   const Instance& instance = *touch.instance;
-  const Vec3 ahead = tick.ahead();
   Vec3 loose = law.force - law.spring;
   // Of a friction law: its spring, and what only ever takes, unless the surface carries the hand along.
   const FrictionState& friction = contact.law.friction;
   const bool printed = instance.material.friction.formulation == Formulation::literal;
-  if (law.contact && friction.stiffness > 0.0 && !printed) {
-    const Vec3 spring = -friction.stiffness * touch.turned(friction.stretch);
+  const double stiffness = rendered * friction.stiffness;
+  if (law.contact && stiffness > 0.0 && !printed) {
+    const Vec3 spring = -stiffness * touch.turned(friction.stretch);
     loose -= spring;
-    const double share =
-        account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, {spring, friction.stiffness});
+    const double share = account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, {spring, stiffness});
     if (share < 1.0) {
       tell(tick, share);
       law.force -= (1.0 - share) * spring;
@@ -172,14 +154,15 @@ void settle_loose(Tick& tick, const Touched& touch, LawForce& law) noexcept {
     account.release(contact.drag);
   }
   if (law.turns) {
-    const double share = account.spend(Giver::shading, law.turn, ahead);
+    const double share = account.spend(Giver::shading, law.turn, tick.ahead());
+    tell(tick, share);
     law.turn *= share;
     law.force += law.turn;
   }
   if (printed) loose -= law.friction;
   if (instance.fine != nullptr && instance.fine->settings().formulation == Formulation::literal) loose -= law.texture;
-  if (touch.moved) {
-    const double share = account.spend(Giver::motion, loose, ahead);
+  if (touch.moved || touch.facts->custom) {
+    const double share = account.spend(touch.moved ? Giver::motion : Giver::custom, loose, tick.ahead());
     tell(tick, share);
     law.force -= (1.0 - share) * loose;
     law.friction *= share;
@@ -207,17 +190,20 @@ void settle_law(Tick& tick, const Touched& touch, const Material& material, LawF
   EnergyAccount& account = tick.state.account;
   HeldForce& held = touch.contact->push;
   const double stiffness = stiffness_of(law, material);
+  double share = 1.0;
   if (law.contact && (law.stored || !law.spring.isZero(0.0))) {
     const auto local = static_cast<float>(law.local > 0.0 ? law.local : material.stiffness);
     const Giver cause = cause_of(tick, touch, touch.contact->stiffness, local);
     touch.contact->stiffness = local;
-    const double share = account.hold(cause, held, {law.spring, stiffness, law.stored, law.keeps});
+    const Spring spring = touch.facts->custom ? believed(law, material, held, account.moved())
+                                              : Spring{law.spring, stiffness, law.stored, law.keeps};
+    share = account.hold(cause, held, spring);
     if (share != 1.0) soften(tick, share, law);
   } else {
     touch.contact->stiffness = 0.0F;
     account.release(held);
   }
-  if (has_loose(touch, law)) settle_loose(tick, touch, law);
+  if (has_loose(touch, law)) settle_loose(tick, touch, share, law);
 }
 
 /// What makes the proxy's spring hold more than was put into it.
@@ -265,7 +251,7 @@ void settle_parts(Tick& tick) noexcept {
   const double share = settle_spring(tick);
   for (Part& part : tick.parts) {
     if (share != 1.0) soften(tick, share, part.law);
-    if (has_loose(*part.touch, part.law)) settle_loose(tick, *part.touch, part.law);
+    if (has_loose(*part.touch, part.law)) settle_loose(tick, *part.touch, share, part.law);
   }
 }
 
@@ -278,8 +264,9 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   const Vec3 position = touch.to_local(tick.probe->pose.position);
   const Vec3 previous = touch.to_local(tick.state.previous_probe);
   // The contact point's laws look the material up where that is.
-  const bool elsewhere = needs_potential(instance.law) && !std::holds_alternative<NormalPerturbationLaw>(instance.law);
-  const Material material = elsewhere ? instance.material : local_material(touch, position);
+  const bool elsewhere = instance.law.facts().own_place;
+  MaterialRoom room;
+  const Material& material = elsewhere ? instance.material : material_there(touch, position, room);
   // A probe that enters within one tick was outside at the last one: ask there first.
   const bool fresh = volume ? !contact.asked : !contact.seen_outside;
   if (fresh && !tick.first) ask(touch, material, previous, motion.velocity, tick.dt);
@@ -299,7 +286,8 @@ void add_law(Tick& tick, Touched& touch, Vec3& shadow) noexcept {
   }
   const bool adds = touch.facts->adds_friction;
   if (instance.fine != nullptr || adds) {
-    const Material felt = elsewhere ? local_material(touch, law.point) : material;
+    MaterialRoom there;
+    const Material& felt = elsewhere ? material_there(touch, law.point, there) : material;
     if (add_fine_forces(touch, felt, adds, felt.stiffness, motion, law)) tick.out.flags.set(TickFlag::texture_faded);
   }
   to_world(touch, law);
@@ -339,7 +327,7 @@ void add_to_proxy(Tick& tick, Part& part) noexcept {
   }
   const Vec3 kept = law.friction;
   law.friction = Vec3::Zero();
-  const Material felt = implicit_of(instance.surface) != nullptr ? local_material(touch, law.point) : local;
+  const Material& felt = implicit_of(instance.surface) != nullptr ? material_there(touch, law.point, room) : local;
   if (add_fine_forces(touch, felt, adds, stiffness, motion_over(tick, touch), law))
     tick.out.flags.set(TickFlag::texture_faded);
   law.friction += kept;
@@ -352,8 +340,9 @@ void add_attraction(Tick& tick, Touched& touch) noexcept {
   HeldForce& held = touch.contact->draw;
   if (!pull.felt) return tick.state.account.release(held);
   const Vec3 force = touch.turned(pull.force);
-  const Spring spring{force, pull.stiffness, pull.potential};
-  tick.out.wrench.force += tick.state.account.hold(Giver::attraction, held, spring) * force;
+  const double share = tick.state.account.hold(Giver::attraction, held, {force, pull.stiffness, pull.potential});
+  tell(tick, share);
+  tick.out.wrench.force += share * force;
   if (!force.isZero(0.0)) tick.out.flags.set(TickFlag::field_force);
 }
 
@@ -365,7 +354,9 @@ void add_effects(Tick& tick) noexcept {
     const Vec3 force = field_effect_force(effect, here, tick.probe->pose.position, tick.probe->twist.linear, cache);
     if (force.isZero()) continue;
     tick.out.flags.set(TickFlag::field_force);
-    tick.out.wrench.force += tick.state.account.spend(Giver::effect, force, tick.ahead()) * force;
+    const double share = tick.state.account.spend(Giver::effect, force, tick.ahead());
+    tell(tick, share);
+    tick.out.wrench.force += share * force;
   }
 }
 

@@ -18,8 +18,8 @@ bool same_pose(const Pose& a, const Pose& b) noexcept {
 
 /// Whether the proxy is held by the triangles of the instance's own mesh, which keep their numbers when it deforms.
 bool on_own_triangles(const Touched& touch) noexcept {
-  return touch.facts->constrains && !touch.facts->smooth && !touch.facts->facets &&
-         !std::holds_alternative<DenseMeshLaw>(touch.instance->law) && base_of(touch.instance->surface) != nullptr;
+  return touch.facts->constrains && !touch.facts->smooth && !touch.facts->by_planes &&
+         base_of(touch.instance->surface) != nullptr;
 }
 
 /// The level that the probe, its speed and the view ask for around a place of the coat.
@@ -104,7 +104,7 @@ bool beside_rim(const Touched& touch, const Vec3& p) noexcept {
 /// The share of a motion (world) up to what an instance stops.
 double free_share(const Tick& tick, const Touched& touch, const Segment& motion) noexcept {
   const Instance& instance = *touch.instance;
-  if (iso_of(instance.surface) != nullptr || std::holds_alternative<GeneratedGeometryLaw>(instance.law)) return 1.0;
+  if (iso_of(instance.surface) != nullptr || touch.facts->facets) return 1.0;
   const Segment local{touch.pose->apply_inverse(motion.from), touch.pose->apply_inverse(motion.to)};
   const FeltView view = felt_view(touch);
   if (const auto* mesh = std::get_if<TriangleView>(&view))
@@ -151,9 +151,9 @@ Vec3 pushed_to_front(const Tick& tick, const Touched& touch, bool front_side, co
     if (!foot.found()) return proxy;
     front = view.front(foot);
     off = 2.0 * least + (level > 0.0 ? 0.0 : radius);
-  } else if (const auto* law = std::get_if<GeneratedGeometryLaw>(&instance.law)) {
+  } else if (touch.facts->facets) {
     GeneratedPatch patch;
-    patch.start(*relief_of(instance), *law);
+    patch.start(*relief_of(instance), instance.law.facets());
     foot = patch.nearest(local, *touch.cache);
     if (!foot.found()) return proxy;
     front = foot.normal;
@@ -264,7 +264,7 @@ void carry(Tick& tick) noexcept {
   for (Touched& touch : tick.touches) {
     Contact& contact = *touch.contact;
     const Instance& instance = *touch.instance;
-    contact.law.index = instance.law.index();
+    contact.law.kind = &instance.law.kind();
     if (touch.facts->volume) {
       const IsoSurface* iso = iso_of(instance.surface);
       const int level = std::min(tick.level, iso->field().levels() - 1);

@@ -84,8 +84,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   surface.places[0].element = law.element;
   if constexpr (triangles) {
     surface.height = point.place().side() * view.skin();
-    if (const auto* shading = std::get_if<ForceShadingLaw>(&instance.law))
-      shade(touch, *shading, {foot, rest.normal, 0.0, law.element, point.place().at}, law);
+    finish_by_law(touch, {foot, rest.normal, 0.0, law.element, point.place().at}, law);
   }
   // Of the bare mesh under it, should the scene take the coat away.
   if constexpr (std::is_same_v<View, ReliefView>) surface.height = point.place().side() * view.surface().base().skin();

@@ -43,33 +43,20 @@ void adopt_view(const View& view, Tick& tick) noexcept {
     turn_held(contact.drag);
     turn_held(contact.draw);
     const Vec3 previous = contact.pose.apply_inverse(state.previous_probe);
-    if (auto* crossing = std::get_if<CrossingMemory>(&contact.law.memory)) crossing->previous = previous;
-    if (auto* point = std::get_if<ContactPointMemory>(&contact.law.memory)) point->previous = previous;
+    if (contact.law.memory.begun && contact.law.kind->seen_from != nullptr)
+      contact.law.kind->seen_from(contact.law.memory, previous);
   }
-}
-
-/// Whether what a law remembers means something on another surface.
-bool outlives_surface(const LawMemory& memory) noexcept {
-  return std::visit(
-      []<class Memory>(const Memory&) {
-        if constexpr (requires { Memory::of_surface; }) {
-          return !Memory::of_surface;
-        } else {
-          return true;
-        }
-      },
-      memory);
 }
 
 /// What a contact is in another scene: what is of the law goes on with the law, what is of the surface with the
 /// surface. False: nothing of it does.
 bool adopt(Contact& contact, const Instance& instance) noexcept {
-  const bool same_law = contact.law.index == instance.law.index();
+  const bool same_law = contact.law.kind == &instance.law.kind();
   const bool same_surface = contact.surface.identity == surface_identity(instance.surface);
   const bool volume = iso_of(instance.surface) != nullptr;
   // A proxy finds its surface again by itself; a law without one has come in from the front, and goes on pushing on the
   // same volume by another law, or by the same law in another volume.
-  const bool pushed = contact.touching && !constrains(instance.law);
+  const bool pushed = contact.touching && !instance.law.constrains();
   if (volume ? !same_surface && !(same_law && pushed) : !same_law) return false;
   if (volume && same_law && same_surface) return true;
   if (volume) {
@@ -81,7 +68,7 @@ bool adopt(Contact& contact, const Instance& instance) noexcept {
   }
   if (!same_surface) {
     contact.surface = {};
-    if (!outlives_surface(contact.law.memory)) contact.law.memory = {};
+    if (instance.law.kind().of_surface) contact.law.memory = {};
   }
   if (!same_law) contact.law = {};
   return true;

@@ -2,7 +2,6 @@
 // One tick, from stage to stage: everything that a stage finds out is here for the next, and for a debugger.
 
 #include "asperity/render/felt.h"
-#include "asperity/render/laws/forces.h"
 #include "asperity/render/scene.h"
 #include "asperity/render/state.h"
 
