@@ -267,11 +267,14 @@ void volume(SceneObject& row) {
       &S::type, only_if(made, "without a generator"), by_contents("another than float32 for cavity"));
 }
 
+/// A number of the field, or a share of its range.
+Type field_value() {
+  return Type::any({Type::number(), Type::share_alone({0.0, 1.0})})
+      .saying("a number in the field's unit, or a share of its range (\"50 %\")");
+}
+
 void iso(SceneObject& row) {
-  row("threshold",
-      Type::any({Type::number(), Type::share_alone({0.0, 1.0})})
-          .saying("a number in the field's unit, or a share of its range (\"50 %\")"),
-      "In the field's unit, or a share of its range (\"50 %\").",
+  row("threshold", field_value(), "In the field's unit, or a share of its range (\"50 %\").",
       or_else("what splits the samples best in two (Otsu 1979); the middle of the range for a bricked file"),
       by_contents("a threshold that the field nowhere has"));
   row("inside", Type::named<Inside>(), "Which side of the threshold is the inside: low as in large-data-2008, or high.",
@@ -279,6 +282,16 @@ void iso(SceneObject& row) {
   row("threshold_speed", speed(positive),
       "How fast the surface may move along its normal when its threshold is changed while it is touched.",
       with_default(0.02));
+  row("schedule", Type::array(Type::object("threshold step"), 1, 1000, "steps"),
+      "Thresholds by the probe's clock: from \"threshold\" at time 0 to that of each step at its time, evenly in "
+      "between.",
+      or_else("the threshold stays"), by_contents("times that do not rise"));
+}
+
+void threshold_step(SceneObject& row) {
+  row("time", seconds(positive), "Since the start.", always_there);
+  row("threshold", field_value(), "In the field's unit, or a share of its range (\"50 %\").", always_there,
+      by_contents("a threshold that the field nowhere has"));
 }
 
 void implicit(SceneObject& row) {
@@ -454,6 +467,7 @@ Rows shape_rows() {
        parametric},
       {{"volume", "Samples on a rectilinear grid, from a file or a generator."}, volume},
       {{"iso", "An isosurface of a volume."}, iso},
+      {{"threshold step", "A threshold at a time."}, threshold_step},
       {{"implicit",
         "A signed potential on a sparse grid, positive outside. One of voxel, resolution and budget says how fine it "
         "is."},

@@ -178,6 +178,25 @@ std::optional<double> read_threshold(ObjectReader& reader, const ScalarField& fi
   return field.lowest() + *given * (field.highest() - field.lowest());
 }
 
+/// Steps of a threshold that changes by the clock; none where there are none.
+Result<std::vector<ThresholdStep>> read_schedule(ObjectReader& iso, const ScalarField& field) {
+  std::vector<ThresholdStep> steps;
+  const SceneJson* json = iso.raw("schedule");
+  if (json == nullptr) return steps;
+  SceneJson canonical = SceneJson::array();
+  for (std::size_t i = 0; i < json->size(); ++i) {
+    ObjectReader reader((*json)[i], iso.place_of("schedule", i), "threshold step");
+    ThresholdStep& step = steps.emplace_back();
+    step.time = reader.get<Seconds>("time");
+    step.threshold = read_threshold(reader, field).value_or(0.0);
+    reader.write("threshold", step.threshold);
+    ASPERITY_CHECK(reader.status());
+    canonical.push_back(std::move(reader.canonical()));
+  }
+  iso.write("schedule", std::move(canonical));
+  return steps;
+}
+
 double chosen_threshold(const VolumePart& volume, SceneContext& context) {
   const ScalarField& field = *volume.field;
   const double threshold =
@@ -231,6 +250,10 @@ Result<std::shared_ptr<const IsoSurface>> read_iso(ObjectReader& surface, const 
   if (!iso) {
     iso.error().place = reader.place_of("threshold");
     return std::move(iso).error();
+  }
+  ASPERITY_TRY(std::vector<ThresholdStep> steps, read_schedule(reader, *volume.field));
+  if (!steps.empty()) {
+    ASPERITY_TRY(iso, at_place(iso->with_schedule(std::move(steps)), reader.place()));
   }
   surface.take("iso", std::move(reader));
   return std::make_shared<const IsoSurface>(std::move(*iso));

@@ -302,7 +302,10 @@ Status check_motion(const Instance& instance, std::size_t index) {
 
 /// What a magnet gives to a hand that it draws in (J).
 double well_of(const Instance& instance) noexcept {
-  double well = instance.law.well(instance.material);
+  Material material = instance.material;
+  if (const ImplicitSurface* implicit = implicit_of(instance.surface))
+    material.stiffness = std::max(material.stiffness, static_cast<double>(implicit->grid().stiffest()));
+  double well = instance.law.well(material);
   if (attraction_reach(instance) > 0.0) {
     const MaterialMaps* maps = relief_of(instance)->coat().materials();
     const bool map = maps != nullptr && maps->has(MaterialChannel::magnetism);

@@ -61,8 +61,8 @@ class Scene {
   [[nodiscard]] bool moves() const noexcept { return moves_; }
   /// Whether an instance draws the probe from outside. [servo]
   [[nodiscard]] bool draws() const noexcept { return draws_; }
-  /// What the scene's magnets give to a hand that they draw in (J): it is lent at the start, and given back by leaving
-  /// them. [servo]
+  /// What the scene's magnets give to a hand that they draw in, at most (J): by leaving them it gives that back.
+  /// [servo]
   [[nodiscard]] double lends() const noexcept { return lends_; }
   /// Whether a surface that moves the proxy may move or change its shape under it. [servo]
   [[nodiscard]] bool changes() const noexcept { return changes_; }

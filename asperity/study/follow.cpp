@@ -95,18 +95,17 @@ const Instance* followed_instance(const Scene& scene) noexcept {
   return nullptr;
 }
 
-double largest_deviation(const IsoSurface& surface) noexcept {
-  const ScalarField& field = surface.field();
-  return std::max(std::abs(field.highest() - surface.threshold()), std::abs(surface.threshold() - field.lowest()));
+double largest_deviation(const IsoView& surface) noexcept {
+  const ScalarField& field = *surface.field;
+  return std::max(std::abs(field.highest() - surface.threshold), std::abs(surface.threshold - field.lowest()));
 }
 
-double follow_error(const IsoSurface& surface, const Vec3& p, CellCache& cache) noexcept {
+double follow_error(const IsoView& surface, const Vec3& p) noexcept {
   FieldJet jet;
   const double largest = largest_deviation(surface);
-  if (!p.allFinite() || !(largest > 0.0) || !surface.field().contains(p) || !surface.view(cache).sample(p, jet))
-    return no_reading;
+  if (!p.allFinite() || !(largest > 0.0) || !surface.field->contains(p) || !surface.sample(p, jet)) return no_reading;
   // Between its samples a smooth field reaches a little beyond them.
-  return std::min(1.0, std::abs(jet.value - surface.threshold()) / largest);
+  return std::min(1.0, std::abs(jet.value - surface.threshold) / largest);
 }
 
 FollowMetrics measure_follow(std::span<const double> errors, std::span<const Vec3> path) {

@@ -27,9 +27,9 @@ struct FollowMetrics {
 /// The isosurface that the follow error is about: of the first instance that has one; nullptr without any. [any]
 const Instance* followed_instance(const Scene& scene) noexcept;
 /// max |F - G| over the volume, in the field's unit; above 0. [any]
-double largest_deviation(const IsoSurface& surface) noexcept;
+double largest_deviation(const IsoView& surface) noexcept;
 /// e_k at a point of the object frame (m); not-a-number outside the volume and where nothing is known. [any]
-double follow_error(const IsoSurface& surface, const Vec3& p, CellCache& cache) noexcept;
+double follow_error(const IsoView& surface, const Vec3& p) noexcept;
 /// From e_k and the probe's place (m) of each tick; both equally long. Ticks whose error is not a number, and the way
 /// to them, are left out. [any]
 FollowMetrics measure_follow(std::span<const double> errors, std::span<const Vec3> path);

@@ -89,10 +89,13 @@ class SeriesBuilder {
     out_.friction.push_back(tick.rendered.parts.friction.dot(pose.tangent));
     out_.texture.push_back(tick.rendered.parts.texture.dot(pose.tangent));
     out_.update.push_back(tick.update_seconds);
-    out_.follow.push_back(followed_ == nullptr
-                              ? no_sample
-                              : follow_error(*iso_of(followed_->surface),
-                                             followed_->world_from_object.apply_inverse(position), follow_cache_));
+    double follow = no_sample;
+    if (followed_ != nullptr) {
+      const IsoSurface& iso = *iso_of(followed_->surface);
+      follow = follow_error(iso.view(follow_cache_, 0, iso.threshold_at(tick.probe.time)),
+                            followed_->world_from_object.apply_inverse(position));
+    }
+    out_.follow.push_back(follow);
     add_energy(tick);
     add_surface(tick, pose.tangent);
     last_ = &tick;
@@ -181,8 +184,9 @@ class SeriesBuilder {
     if (iso_of(shape) != nullptr && !has_exact_mesh(shape)) {
       const IsoSurface& iso = *iso_of(shape);
       // The proxy is also held from the inside.
-      add_smooth(*instance, iso.view(caches_[tick.rendered.contact.instance]), iso.bounds(), tick,
-                 instance->law.constrains());
+      add_smooth(*instance,
+                 iso.view(caches_[tick.rendered.contact.instance].cells, 0, iso.threshold_at(tick.probe.time)),
+                 iso.bounds(), tick, instance->law.constrains());
       if (const ImplicitSurface* implicit = implicit_of(shape); implicit != nullptr && implicit->mesh() != nullptr)
         add_texture(*instance, *implicit, tick);
       return;

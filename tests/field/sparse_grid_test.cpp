@@ -171,6 +171,7 @@ TEST(SparseGrid, GoesThroughItsSourceUnchanged) {
   const SparseGrid grid = SparseGrid::build(source).value();
   EXPECT_TRUE(grid.has_faces());
   EXPECT_TRUE(grid.has_materials());
+  EXPECT_EQ(grid.stiffest(), 300.0F);
   const SparseSource back = grid.source();
   ASSERT_EQ(back.blocks.size(), source.blocks.size());
   for (std::size_t b = 0; b < back.blocks.size(); ++b) {

@@ -102,6 +102,38 @@ TEST_F(VolumeScene, ThresholdsAsNumbersAndShares) {
   }
 }
 
+TEST_F(VolumeScene, SchedulesOfThresholdsAreReadAndTouched) {
+  const auto with = [](const std::string& schedule) {
+    return R"({"surfaces":[{"volume":"ball.json","iso":{"threshold":"50 %","schedule":)" + schedule + "}}]}";
+  };
+  const Experiment e = good(with(R"([{"time":"500 ms","threshold":"60 %"},{"time":2,"threshold":0.1}])"));
+  const ScalarField& field = iso(e).field();
+  ASSERT_EQ(iso(e).schedule().size(), 2U);
+  EXPECT_EQ(iso(e).schedule()[0].time.count(), 0.5);
+  EXPECT_NEAR(iso(e).schedule()[0].threshold, field.lowest() + 0.6 * (field.highest() - field.lowest()), 1e-12);
+  EXPECT_EQ(iso(e).schedule()[1].threshold, 0.1);
+  const Experiment again = good(e.canonical_json);
+  EXPECT_EQ(again.canonical_json, e.canonical_json);
+  EXPECT_EQ(short_run(again, 1500), short_run(e, 1500));
+  EXPECT_NE(short_run(e, 1500),
+            short_run(good(R"({"surfaces":[{"volume":"ball.json","iso":{"threshold":"50 %"}}]})"), 1500));
+  const std::pair<const char*, const char*> refused[] = {
+      {"[]", ""},
+      {R"([{"threshold":"60 %"}])", "[0].time"},
+      {R"([{"time":"1 s"}])", "[0].threshold"},
+      {R"([{"time":0,"threshold":"60 %"}])", "[0].time"},
+      {R"([{"time":"1 mm","threshold":"60 %"}])", "[0].time"},
+      {R"([{"time":1,"threshold":"60 %"},{"time":1,"threshold":"50 %"}])", "[1].time"},
+      {R"([{"time":1,"threshold":1e30}])", "[0].threshold"},
+      {R"([{"time":1,"treshold":"60 %"}])", "[0].treshold"},
+      {R"({"time":1})", ""}};
+  for (const auto& [schedule, place] : refused) {
+    const Error error = bad(with(schedule));
+    EXPECT_EQ(error.place, std::string("surfaces[0].iso.schedule") + place) << schedule << ": " << error.message();
+    EXPECT_FALSE(error.accepted.empty()) << schedule;
+  }
+}
+
 TEST_F(VolumeScene, FieldsAreDerivedInTheFilesUnits) {
   // curl = (0, -(0.2 x + 0.5), 4), u . curl = x, x from 0 to 6; fitting to the workspace does not change them.
   const auto field = [&](const std::string& derive, const std::string& threshold) {

@@ -184,6 +184,13 @@ std::shared_ptr<const SparseGrid> two_materials() {
   return std::make_shared<const SparseGrid>(SparseGrid::build(std::move(source)).value());
 }
 
+TEST(ImplicitProxy, AMagnetLendsAsItsStiffestPlaceDraws) {
+  Instance instance = implicit_instance(two_materials());
+  instance.law = MagneticLaw{Formulation::consistent, 0.001};
+  instance.material.stiffness = 300.0;
+  EXPECT_DOUBLE_EQ(Scene::build({instance}, 0.0)->lends(), 1000.0 * 0.001 * 0.001 / 6.0);
+}
+
 TEST(ImplicitProxy, MaterialsAreThoseOfTheContact) {
   const Scene scene = Scene::build({implicit_instance(two_materials())}, 0.0).value();
   for (const auto& [x, stiffness] : {std::pair{-0.008, 250.0}, std::pair{0.008, 1000.0}, std::pair{0.0, 625.0}}) {

@@ -363,6 +363,54 @@ TEST(IsoProxy, ASurfaceThatComesOverAFreeProbeTakesItUp) {
   EXPECT_NEAR(state.proxy.norm(), 0.0215, 1e-6);
 }
 
+/// That of the ball of the next test at a time.
+double scheduled_radius(double t) {
+  if (t < 0.5) return 0.03 + 0.004 * t;
+  if (t < 1.0) return 0.032 - 0.004 * (t - 0.5);
+  return std::max(0.026, 0.03 - 0.02 * (t - 1.0));
+}
+
+TEST(IsoProxy, AScheduleMovesTheSurfaceByTheProbesClock) {
+  // Distance from the centre: the surface is a ball whose radius is the threshold, and grows by 4 mm a second.
+  const IsoSurface first = IsoSurface::build(sphere_field(65), 0.03, Inside::low).value();
+  Instance instance = iso_instance(first.shared_field(), 0.03);
+  instance.surface = std::make_shared<const IsoSurface>(
+      first.with_schedule({{Seconds(0.5), 0.032}, {Seconds(1.0), 0.03}, {Seconds(1.2), 0.026}}).value());
+  for (const double power : {1.0, 0.0}) {
+    SceneSettings settings;
+    settings.change_power = power;
+    const Scene scene = Scene::build({instance}, settings).value();
+    for (const double dt : {1e-3, 2.5e-4}) {
+      ProxyState state;
+      double given = 0.0;
+      Vec3 last = Vec3::Zero();
+      Vec3 from = Vec3(0.0, 0.0, 0.032);
+      for (double t = 0.0; t < 1.4; t += dt) {
+        // Pressed to 1 mm below the first surface, and held there.
+        ProbeSample probe;
+        probe.pose.position = Vec3(0.0, 0.0, std::max(0.029, 0.032 - 0.1 * t));
+        probe.time = Seconds(t);
+        const ForceSample out = step(scene, state, probe, Seconds(dt));
+        given += last.dot(probe.pose.position - from) - 0.5 * 1000.0 * (probe.pose.position - from).squaredNorm();
+        last = out.wrench.force;
+        from = probe.pose.position;
+        if (t < 0.05 || std::abs(t - 1.15) < 0.02) continue;
+        const double radius = scheduled_radius(t);
+        const double force = 1000.0 * std::max(0.0, radius - 0.029);
+        if (power > 0.0) {
+          // A tick of 4 or 20 mm/s behind the clock at most.
+          ASSERT_NEAR(out.wrench.force.z(), force, 0.02 + 1000.0 * 0.02 * dt) << t;
+        } else {
+          // Nobody pays for a surface that grows under a hand that holds still.
+          ASSERT_LE(out.wrench.force.z(), std::min(force, 1.0) + 0.03) << t;
+        }
+        ASSERT_FALSE(t > 1.2 && out.flags.has(TickFlag::contact)) << t;
+      }
+      EXPECT_TRUE(power > 0.0 || given <= 1e-9) << given;
+    }
+  }
+}
+
 TEST(IsoProxy, ABallRestsItsRadiusAwayFromTheSurface) {
   for (const double radius : {0.0005, 0.003}) {
     const Scene scene = scene_of(iso_instance(sphere_field(65), 0.03), radius);

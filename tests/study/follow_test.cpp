@@ -75,13 +75,14 @@ TEST(FollowError, IsTheShareOfTheLargestDeviationInTheVolume) {
   // Values 0 to 10 along x, threshold 4: the largest deviation is 6.
   const auto field = sampled(cube(0.05, 11), [](const Vec3& p) { return 5.0 + 100.0 * p.x(); });
   const auto surface = surface_of(field, 4.0);
-  EXPECT_NEAR(largest_deviation(*surface), 6.0, 1e-5);
-  CellCache cache;
-  EXPECT_NEAR(follow_error(*surface, Vec3(-0.01, 0.02, 0.01), cache), 0.0, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(0.02, 0.0, 0.0), cache), 0.5, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(0.05, 0.0, 0.0), cache), 1.0, 1e-6);
-  EXPECT_NEAR(follow_error(*surface, Vec3(-0.04, 0.0, 0.0), cache), 0.5, 1e-6);
-  EXPECT_TRUE(std::isnan(follow_error(*surface, Vec3(0.06, 0.0, 0.0), cache)));
+  CellCache cells;
+  const IsoView view = surface->view(cells);
+  EXPECT_NEAR(largest_deviation(view), 6.0, 1e-5);
+  EXPECT_NEAR(follow_error(view, Vec3(-0.01, 0.02, 0.01)), 0.0, 1e-6);
+  EXPECT_NEAR(follow_error(view, Vec3(0.02, 0.0, 0.0)), 0.5, 1e-6);
+  EXPECT_NEAR(follow_error(view, Vec3(0.05, 0.0, 0.0)), 1.0, 1e-6);
+  EXPECT_NEAR(follow_error(view, Vec3(-0.04, 0.0, 0.0)), 0.5, 1e-6);
+  EXPECT_TRUE(std::isnan(follow_error(view, Vec3(0.06, 0.0, 0.0))));
 }
 
 // --- detection ---

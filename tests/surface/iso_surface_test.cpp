@@ -225,6 +225,30 @@ TEST(IsoSurface, RefusesAThresholdThatTheFieldNeverPasses) {
   EXPECT_EQ(surface.with_threshold(0.02)->threshold(), 0.02);
 }
 
+TEST(IsoSurface, AScheduleRunsEvenlyFromStepToStep) {
+  const IsoSurface surface = IsoSurface::build(sphere_field(33), 0.02, Inside::low).value();
+  EXPECT_EQ(surface.threshold_at(Seconds(7.0)), 0.02);
+  const IsoSurface changing =
+      surface.with_schedule({{Seconds(1.0), 0.03}, {Seconds(1.5), 0.03}, {Seconds(2.5), 0.01}}).value();
+  const std::pair<double, double> expected[] = {{-1.0, 0.02}, {0.0, 0.02}, {0.25, 0.0225}, {1.0, 0.03}, {1.2, 0.03},
+                                                {1.5, 0.03},  {2.0, 0.02}, {2.5, 0.01},    {9.0, 0.01}};
+  for (const auto& [time, threshold] : expected)
+    EXPECT_NEAR(changing.threshold_at(Seconds(time)), threshold, 1e-15) << time;
+  EXPECT_EQ(changing.threshold(), 0.02);
+  const auto refused = [&](std::vector<ThresholdStep> steps, const char* place) {
+    const Error error = surface.with_schedule(std::move(steps)).error();
+    EXPECT_EQ(error.code, ErrorCode::bad_value);
+    EXPECT_EQ(error.place, place);
+    EXPECT_FALSE(error.accepted.empty());
+  };
+  refused({{Seconds(0.0), 0.03}}, "schedule[0].time");
+  refused({{Seconds(1.0), 0.03}, {Seconds(1.0), 0.02}}, "schedule[1].time");
+  refused({{Seconds(std::nan("")), 0.03}}, "schedule[0].time");
+  refused({{Seconds(infinity), 0.03}}, "schedule[0].time");
+  refused({{Seconds(1.0), 0.03}, {Seconds(2.0), 1.0}}, "schedule[1].threshold");
+  refused({{Seconds(1.0), std::nan("")}}, "schedule[0].threshold");
+}
+
 TEST(IsoSurface, BallStopsAtItsRadius) {
   const IsoSurface surface = IsoSurface::build(sphere_field(65), 0.03, Inside::low).value();
   std::mt19937_64 generator(12);

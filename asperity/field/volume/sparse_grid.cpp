@@ -209,6 +209,7 @@ void SparseGrid::finish() {
   lowest_ = highest_ = bricks_.front()->value[apron_index(0, 0, 0)];
   has_faces_ = true;
   has_materials_ = false;
+  stiffest_ = 0.0F;
   std::vector<ValueRange> ranges(table_.size());
   for_each_place(std::array<std::uint32_t, 3>{}, counts_, [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     const std::size_t entry = table_index(i, j, k);
@@ -218,6 +219,7 @@ void SparseGrid::finish() {
       for (const float value : brick.value) range.include({value, value});
       has_faces_ = has_faces_ && !brick.face.empty();
       has_materials_ = has_materials_ || brick.owns_material;
+      for (const PointMaterial& material : brick.material) stiffest_ = std::fmax(stiffest_, material.stiffness);
       lowest_ = std::min(lowest_, range.lower);
       highest_ = std::max(highest_, range.upper);
       return;

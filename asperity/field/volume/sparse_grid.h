@@ -107,6 +107,8 @@ class SparseGrid {
   [[nodiscard]] std::size_t bricks() const noexcept { return bricks_.size(); }
   [[nodiscard]] bool has_faces() const noexcept { return has_faces_; }
   [[nodiscard]] bool has_materials() const noexcept { return has_materials_; }
+  /// The greatest stiffness that is stored (N/m); 0: none is. [any]
+  [[nodiscard]] float stiffest() const noexcept { return stiffest_; }
   [[nodiscard]] const MinMaxOctree& octree() const noexcept { return octree_; }
   [[nodiscard]] float lowest() const noexcept { return lowest_; }
   [[nodiscard]] float highest() const noexcept { return highest_; }
@@ -174,6 +176,7 @@ class SparseGrid {
   MinMaxOctree octree_;  ///< of leaves of one brick
   bool has_faces_ = false;
   bool has_materials_ = false;
+  float stiffest_ = 0.0F;
   float lowest_ = 0.0F;
   float highest_ = 0.0F;
   std::uint64_t identity_ = 0;

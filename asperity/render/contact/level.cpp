@@ -54,9 +54,8 @@ std::uint32_t element_at(const Instance& instance, int level, const Vec3& place,
   return iso.view(cache.cells, level, iso.threshold()).element_at(place);
 }
 
-bool felt_level(const IsoSurface& surface, double further, Sides sides, int level, Seconds dt, const Vec3& free,
+bool felt_level(const IsoSurface& surface, double target, Sides sides, int level, Seconds dt, const Vec3& free,
                 SurfaceCache& cache, OfSurface& state) noexcept {
-  const double target = surface.threshold() + further;
   if (state.identity != surface.field().identity()) {
     state = {};
     state.identity = surface.field().identity();

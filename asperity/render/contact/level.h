@@ -15,10 +15,10 @@ double ball_level(const Instance& instance, const Scene& scene) noexcept;
 std::uint32_t element_at(const Instance& instance, int level, const Vec3& place, SurfaceCache& cache) noexcept;
 
 /// Brings level and threshold of a contact up to this tick's: the level to `level`, where the surface first stays where
-/// it was felt; the threshold towards the scene's own, no faster than the surface's threshold_speed along its normal.
+/// it was felt; the threshold towards `target`, no faster than the surface's threshold_speed along its normal.
 /// What is touched moves along; a surface that comes over `free` (the proxy in free space, object frame) takes it up.
-/// True when the surface moved. `further`: what ball_level answers. [servo]
-bool felt_level(const IsoSurface& surface, double further, Sides sides, int level, Seconds dt, const Vec3& free,
+/// True when the surface moved. [servo]
+bool felt_level(const IsoSurface& surface, double target, Sides sides, int level, Seconds dt, const Vec3& free,
                 SurfaceCache& cache, OfSurface& state) noexcept;
 
 }  // namespace asperity

@@ -108,17 +108,6 @@ class EnergyAccount {
   }
   /// Takes in energy (J); what exceeds the capacity is lost. [servo]
   void fill(double energy) noexcept { level_ = std::max(level_, std::min(capacity_, level_ + std::max(0.0, energy))); }
-  /// Pays up to `energy` (J) and answers how much it paid. [servo]
-  double pay(Giver giver, double energy) noexcept {
-    const double wanted = std::max(0.0, energy);
-    const double paid = std::min(wanted, std::max(0.0, level_));
-    Flow& flow = flows_[static_cast<std::size_t>(giver)];
-    flow.asked += wanted;
-    flow.paid += paid;
-    level_ -= paid;
-    return paid;
-  }
-
   /// The share that may be rendered of a force that is held: as much as the frozen force holds after the hand's motion,
   /// and as the account pays. Remembers what is rendered. [servo]
   [[gnu::always_inline]] double hold(Giver giver, HeldForce& held, const Spring& spring) noexcept {
@@ -194,6 +183,16 @@ class EnergyAccount {
   }
 
  private:
+  /// Pays up to `energy` (J) and answers how much it paid. [servo]
+  double pay(Giver giver, double energy) noexcept {
+    const double wanted = std::max(0.0, energy);
+    const double paid = std::min(wanted, std::max(0.0, level_));
+    Flow& flow = flows_[static_cast<std::size_t>(giver)];
+    flow.asked += wanted;
+    flow.paid += paid;
+    level_ -= paid;
+    return paid;
+  }
   /// What is left of `hold` where it is not plain that all of the force may be rendered.
   [[gnu::noinline]] double hold_less(Giver giver, HeldForce& held, const Spring& spring, double put_in,
                                      double now) noexcept {

@@ -141,7 +141,7 @@ Vec3 pushed_to_front(const Tick& tick, const Touched& touch, bool front_side, co
     // A point in touch moves with its isosurface (felt_level); here is one that the scene newly has.
     if (touch.contact->surface.identity != 0) return proxy;
     const double level = ball_level(instance, tick.scene);
-    const IsoView view = iso->view(touch.cache->cells, 0, iso->threshold() + level);
+    const IsoView view = iso->view(touch.cache->cells, 0, iso->threshold_at(tick.probe->time) + level);
     FieldJet jet;
     // A proxy that rested on the last scene's surface lies on this one's, or on either side of it by rounding.
     least = 2.0 * view.skin();
@@ -268,8 +268,9 @@ void carry(Tick& tick) noexcept {
     if (touch.facts->volume) {
       const IsoSurface* iso = iso_of(instance.surface);
       const int level = std::min(tick.level, iso->field().levels() - 1);
-      if (felt_level(*iso, ball_level(instance, tick.scene), touch.facts->sides, level, tick.dt,
-                     touch.pose->apply_inverse(state.proxy), *touch.cache, contact.surface))
+      const double target = iso->threshold_at(tick.probe->time) + ball_level(instance, tick.scene);
+      if (felt_level(*iso, target, touch.facts->sides, level, tick.dt, touch.pose->apply_inverse(state.proxy),
+                     *touch.cache, contact.surface))
         tick.surfaces_moved = true;
     } else if (tick.changed || contact.surface.identity == 0) {
       if (contact.surface.identity != touch.facts->identity) contact.surface = {};

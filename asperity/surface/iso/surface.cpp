@@ -45,16 +45,19 @@ Box leaf_cells(const ScalarField& field, int level, const MinMaxOctree::Node& le
   return box;
 }
 
+Status check_threshold(const ScalarField& field, double threshold) {
+  if (threshold > field.lowest() && threshold < field.highest()) return success();
+  return bad_value(
+      fmt::format("is {:g}, and the field ranges from {:g} to {:g}", threshold, field.lowest(), field.highest()),
+      "threshold", "a value between them");
+}
+
 }  // namespace
 
 Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, double threshold, Inside inside,
                                      double threshold_speed) {
   if (field == nullptr) return bad_value("holds no field", "volume", "a scalar field");
-  if (!(threshold > field->lowest() && threshold < field->highest())) {
-    return bad_value(
-        fmt::format("is {:g}, and the field ranges from {:g} to {:g}", threshold, field->lowest(), field->highest()),
-        "threshold", "a value between them");
-  }
+  ASPERITY_CHECK(check_threshold(*field, threshold));
   if (!(threshold_speed > 0.0 && std::isfinite(threshold_speed))) {
     return bad_value(fmt::format("is {:g}", threshold_speed), "threshold_speed", "a speed above 0");
   }
@@ -73,6 +76,31 @@ Result<IsoSurface> IsoSurface::build(std::shared_ptr<const ScalarField> field, d
 
 Result<IsoSurface> IsoSurface::with_threshold(double threshold) const {
   return build(field_, threshold, inside_, threshold_speed_);
+}
+
+Result<IsoSurface> IsoSurface::with_schedule(std::vector<ThresholdStep> steps) const {
+  Seconds last{0.0};
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const std::string place = fmt::format("schedule[{}]", i);
+    if (!(steps[i].time > last && std::isfinite(steps[i].time.count()))) {
+      return bad_value(fmt::format("is {:g}, after {:g}", steps[i].time.count(), last.count()), place + ".time",
+                       "a time after that of the step before (s, ms)");
+    }
+    if (Status good = check_threshold(*field_, steps[i].threshold); !good) return std::move(good).error().at(place);
+    last = steps[i].time;
+  }
+  IsoSurface scheduled = *this;
+  scheduled.schedule_ = std::move(steps);
+  return scheduled;
+}
+
+double IsoSurface::scheduled(Seconds time) const noexcept {
+  const auto next = std::upper_bound(schedule_.begin(), schedule_.end(), time,
+                                     [](Seconds at, const ThresholdStep& step) { return at < step.time; });
+  if (next == schedule_.end()) return schedule_.back().threshold;
+  const ThresholdStep last = next == schedule_.begin() ? ThresholdStep{Seconds(0.0), threshold_} : *(next - 1);
+  const double share = std::clamp((time - last.time) / (next->time - last.time), 0.0, 1.0);
+  return last.threshold + share * (next->threshold - last.threshold);
 }
 
 /// Bounds and typical slope, from the cells that the surface crosses: all of a small volume's, a sample of a large

@@ -2,8 +2,10 @@
 // Isosurfaces of scalar fields, touched directly: no triangles anywhere.
 
 #include <memory>
+#include <vector>
 
 #include "asperity/core/names.h"
+#include "asperity/core/units.h"
 #include "asperity/field/volume/scalar_field.h"
 #include "asperity/surface/view.h"
 
@@ -91,6 +93,12 @@ struct IsoView {
 };
 static_assert(SurfaceView<IsoView>);
 
+/// The threshold that an isosurface has at a time.
+struct ThresholdStep {
+  Seconds time{0.0};
+  double threshold = 0.0;
+};
+
 /// The isosurface of a scalar field at a threshold.
 class IsoSurface {
  public:
@@ -100,10 +108,19 @@ class IsoSurface {
                                   double threshold_speed = 0.02);
   /// The same field at another threshold: what a change while touching is made with. Errors as above. [build]
   [[nodiscard]] Result<IsoSurface> with_threshold(double threshold) const;
+  /// The same with a threshold that changes by the probe's clock: from its own at time 0 to that of each step at its
+  /// time, evenly in between, and as the last step leaves it from there on. Errors: bad_value naming the step (times
+  /// that do not rise from 0, thresholds that the field nowhere reaches). [build]
+  [[nodiscard]] Result<IsoSurface> with_schedule(std::vector<ThresholdStep> steps) const;
 
   [[nodiscard]] const ScalarField& field() const noexcept { return *field_; }
   [[nodiscard]] const std::shared_ptr<const ScalarField>& shared_field() const noexcept { return field_; }
   [[nodiscard]] double threshold() const noexcept { return threshold_; }
+  /// That of its schedule. [servo]
+  [[nodiscard]] double threshold_at(Seconds time) const noexcept {
+    return schedule_.empty() ? threshold_ : scheduled(time);
+  }
+  [[nodiscard]] const std::vector<ThresholdStep>& schedule() const noexcept { return schedule_; }
   [[nodiscard]] Inside inside() const noexcept { return inside_; }
   [[nodiscard]] double threshold_speed() const noexcept { return threshold_speed_; }
   /// Typical length of the field's gradient on the surface, by the field's unit and metre. [any]
@@ -122,12 +139,14 @@ class IsoSurface {
  private:
   IsoSurface() = default;
   void measure();
+  [[nodiscard]] double scheduled(Seconds time) const noexcept;
 
   std::shared_ptr<const ScalarField> field_;
   double threshold_ = 0.0;
   Inside inside_ = Inside::low;
   double threshold_speed_ = 0.02;
   double typical_slope_ = 0.0;
+  std::vector<ThresholdStep> schedule_;
   Box surface_bounds_;
 };
 
