@@ -28,40 +28,14 @@ Vec3 on_cone(const Vec3& force, const Vec3& normal, const Friction& friction, bo
   return length <= most ? force : Vec3(push * normal + (most / length) * along);
 }
 
-/// One surface touched by a point, or by a ball where the surface has one level further out for it. False, and nothing
-/// done, where more than one plane of a mesh may hold it.
+/// What a point that rests on a surface answers, world frame. `foot`: of the surface, object frame.
 template <SurfaceView View>
-bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
+void answer_at_rest(const View& view, const PointProxy<View>& point, const PointRest& rest, const Vec3& foot,
+                    const Friction& friction, const Material& material, Tick& tick, Part& part) noexcept {
   constexpr bool triangles = std::is_same_v<View, TriangleView>;
-  const Instance& instance = *touch.instance;
+  Touched& touch = *part.touch;
   OfSurface& surface = touch.contact->surface;
   const Vec3& position = tick.probe->pose.position;
-  const double radius = tick.scene.probe_radius();
-  const Vec3 from = touch.to_local(tick.state.proxy);
-  // Friction is that of the place where the proxy rests.
-  const Vec3& place = surface.rests && touch.facts->volume ? surface.places[0].at : from;
-  MaterialRoom room;
-  const Friction friction = friction_of(touch, material_there(touch, place, room));
-  const bool rested = surface.rests;
-  const bool slid = surface.sliding;
-  PointProxy<View> point(view, touch.facts->sides, friction, touch.to_local(position), surface);
-  const PointRest rest = point.run(from);
-  if (!rest.simple) {
-    surface.rests = rested;
-    surface.sliding = slid;
-    return false;
-  }
-  tick.converged = rest.converged;
-  Part& part = *tick.parts.emplace_back();
-  part.touch = &touch;
-  part.stiffness = instance.material.stiffness;
-  if (!rest.contact) {
-    tick.felt = tick.state.proxy = position;
-    return true;
-  }
-  const Vec3 foot = rest.proxy - radius * rest.normal;
-  const Material& material = material_there(touch, foot, room);
-  part.stiffness = material.stiffness;
   LawForce& law = part.law;
   law.contact = true;
   law.normal = touch.turned(rest.normal);
@@ -75,11 +49,11 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   law.penetration = spring.norm();
   law.pulls = rest.pulls;
   law.force = law.spring = material.stiffness * spring;
-  law.point = tick.felt - radius * law.normal;
+  law.point = tick.felt - tick.scene.probe_radius() * law.normal;
   if constexpr (requires { view.element(point.place(), point.spot()); }) {
     law.element = view.element(point.place(), point.spot());
   } else {
-    law.element = element_at(instance, view.level, foot, *touch.cache);
+    law.element = element_at(*touch.instance, view.level, foot, *touch.cache);
   }
   surface.places[0].element = law.element;
   if constexpr (triangles) {
@@ -99,15 +73,47 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   }
   if constexpr (requires { view.height(point.spot()); }) law.height = view.height(point.spot());
   if constexpr (requires { view.bend(point.place(), point.spot()); }) {
-    if (instance.fine != nullptr) {
-      law.bends = true;
-      law.bend = point.place().side() * view.bend(point.place(), point.spot());
-      if (!touch.at_origin) {
-        const Mat3 turn = touch.pose->orientation.toRotationMatrix();
-        law.bend = turn * law.bend * turn.transpose();
-      }
-    }
+    if (touch.instance->fine == nullptr) return;
+    law.bends = true;
+    law.bend = point.place().side() * view.bend(point.place(), point.spot());
+    if (touch.at_origin) return;
+    const Mat3 turn = touch.pose->orientation.toRotationMatrix();
+    law.bend = turn * law.bend * turn.transpose();
   }
+}
+
+/// One surface touched by a point, or by a ball where the surface has one level further out for it. False, and nothing
+/// done, where more than one plane of a mesh may hold it.
+template <SurfaceView View>
+bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
+  OfSurface& surface = touch.contact->surface;
+  const Vec3& position = tick.probe->pose.position;
+  const Vec3 from = touch.to_local(tick.state.proxy);
+  // Friction is that of the place where the proxy rests.
+  const Vec3& place = surface.rests && touch.facts->volume ? surface.places[0].at : from;
+  MaterialRoom room;
+  const Friction friction = friction_of(touch, material_there(touch, place, room));
+  const bool rested = surface.rests;
+  const bool slid = surface.sliding;
+  PointProxy<View> point(view, touch.facts->sides, friction, touch.to_local(position), surface);
+  const PointRest rest = point.run(from);
+  if (!rest.simple) {
+    surface.rests = rested;
+    surface.sliding = slid;
+    return false;
+  }
+  tick.converged = rest.converged;
+  Part& part = *tick.parts.emplace_back();
+  part.touch = &touch;
+  part.stiffness = touch.instance->material.stiffness;
+  if (!rest.contact) {
+    tick.felt = tick.state.proxy = position;
+    return true;
+  }
+  const Vec3 foot = rest.proxy - tick.scene.probe_radius() * rest.normal;
+  const Material& material = material_there(touch, foot, room);
+  part.stiffness = material.stiffness;
+  answer_at_rest(view, point, rest, foot, friction, material, tick, part);
   return true;
 }
 
