@@ -115,11 +115,10 @@ class EnergyAccount {
     // of it.
     const double put_in = held.energy - held.force.dot(moved_);
     const double stiffness = held.stiffness > 0.0F ? static_cast<double>(held.stiffness) : spring.stiffness;
-    const double left = put_in + 0.5 * stiffness * moved_.squaredNorm();
     double now = spring.stored ? *spring.stored : spring.least();
     if (spring.keeps) now = std::max(now, put_in);
-    if (!(now <= left) || held.softened || giver == Giver::stiffness)
-      return hold_less(giver, held, spring, put_in, now);
+    const bool covered = now <= put_in || now <= put_in + 0.5 * stiffness * moved_.squaredNorm();
+    if (!covered || held.softened || giver == Giver::stiffness) return hold_less(giver, held, spring, put_in, now);
     stiffness_ += stiffness;
     fill(put_in - now);
     held = {spring.force, now, static_cast<float>(spring.stiffness), false};

@@ -144,7 +144,8 @@ void settle_loose(Tick& tick, const Touched& touch, double rendered, LawForce& l
   if (law.contact && stiffness > 0.0 && !printed) {
     const Vec3 spring = -stiffness * touch.turned(friction.stretch);
     loose -= spring;
-    const double share = account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag, {spring, stiffness});
+    const double share = account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag,
+                                      {spring, stiffness, rendered * law.held});
     if (share < 1.0) {
       tell(tick, share);
       law.force -= (1.0 - share) * spring;
