@@ -77,15 +77,18 @@ TEST_F(ImplicitProgram, RepresentationsAreComparedByTheExactGeometry) {
   const auto compared = nlohmann::json::parse(read(".out"));
   double shading = 0.0;
   double proxy = 1.0;
+  double point = 1.0;
   for (const auto& law : compared["laws"]) {
     const auto& direction = law["metrics"]["direction"];
     ASSERT_GT(direction["near_edges"]["samples"].get<int>(), 0) << law["law"];
     if (law["law"] == "mesh/force-shading-literal") shading = direction["elsewhere"]["mean"].get<double>();
     if (law["law"] == "proxy") proxy = direction["elsewhere"]["mean"].get<double>();
+    if (law["law"] == "virtual-contact-point") point = direction["elsewhere"]["mean"].get<double>();
   }
   // Row K-3: shading turns the force over the whole face, a potential only near the edge.
   EXPECT_GT(shading, 0.1);
   EXPECT_LT(proxy, 1e-4);
+  EXPECT_LT(point, 1e-4);
 }
 
 TEST_F(ImplicitProgram, TheScenesOwnLawKeepsItsOptions) {

@@ -56,15 +56,23 @@ PointMaterial at(const SparseGrid& grid, const Vec3& p) {
   return grid.material(p, own(), hint);
 }
 
-/// What a stored point has after brushes of stiffness alone, by the formula of the header.
+/// From 0 to 1 without a kink at either end: de Casteljau's way along 0, 0, 1, 1.
+double eased(double t) {
+  std::array<double, 4> row = {0.0, 0.0, 1.0, 1.0};
+  for (std::size_t left = 3; left > 0; --left) {
+    for (std::size_t i = 0; i < left; ++i) row[i] += t * (row[i + 1] - row[i]);
+  }
+  return row[0];
+}
+
+/// What a stored point has after brushes of stiffness alone: each takes it nearer to its own, by how deep in it it is.
 double stiffness_after(const std::vector<MaterialBrush>& brushes, const Vec3& node) {
   double stiffness = static_cast<double>(own().stiffness);
   for (const MaterialBrush& b : brushes) {
     const double distance = (node - b.centre).norm();
     if (distance > b.radius) continue;
-    const double t = b.falloff > 0.0 ? std::min(1.0, (b.radius - distance) / b.falloff) : 1.0;
-    const double weight = t * t * (3.0 - 2.0 * t);
-    stiffness += weight * (static_cast<double>(b.material.stiffness) - stiffness);
+    const double share = distance <= b.radius - b.falloff ? 1.0 : eased((b.radius - distance) / b.falloff);
+    stiffness = share * static_cast<double>(b.material.stiffness) + (1.0 - share) * stiffness;
   }
   return stiffness;
 }

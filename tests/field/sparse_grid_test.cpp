@@ -260,12 +260,33 @@ TEST(SparseGrid, AnEditSharesWhatItDoesNotTouch) {
   EXPECT_NE(edited.identity(), grid->identity());
   SparseHint a;
   SparseHint b;
+  SparseHint old;
+  int shared = 0;
+  int own = 0;
   std::mt19937_64 generator(8);
   for (int n = 0; n < 20000; ++n) {
     const Vec3 p = random_point(generator, 0.036);
     EXPECT_EQ(edited.trilinear(p, a).value, again.trilinear(p, b).value);
     EXPECT_TRUE(edited.node_gradients(p, a).gradient == again.node_gradients(p, b).gradient);
+    // The very same brick, unless the edit reaches it or, by its repeated neighbours, one beside it.
+    const double before = grid->trilinear(p, old).value;
+    ASSERT_TRUE(std::isfinite(before));
+    if (a.brick == nullptr) continue;
+    int far = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int at = static_cast<int>(std::floor((p - grid->origin())[axis] / (8.0 * voxel)));
+      far = std::max(far, std::abs(at - block.at[static_cast<std::size_t>(axis)]));
+    }
+    if (far == 0) {
+      EXPECT_NE(a.brick, old.brick);
+      ++own;
+    } else if (far > 1) {
+      EXPECT_EQ(a.brick, old.brick);
+      ++shared;
+    }
   }
+  EXPECT_GT(own, 3);
+  EXPECT_GT(shared, 1000);
   SparseBlock elsewhere = block;
   elsewhere.at = {100, 0, 0};
   EXPECT_EQ(grid->edited({elsewhere}).error().code, ErrorCode::bad_value);

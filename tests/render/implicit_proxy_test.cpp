@@ -270,18 +270,73 @@ TEST_P(ImplicitProxyEach, AnEditedCopyIsTouchedOnFromWhereTheProxyWas) {
   }
 }
 
+TEST_P(ImplicitProxyEach, K_3_DirectionOnATurnedBoxIsTheFacesFromThreeVoxelsOn) {
+  const double half = 0.02;
+  const double voxel = 0.8e-3;
+  std::mt19937_64 generator(23);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  double near = 0.0;
+  for (int turn = 0; turn < 4; ++turn) {
+    const Mat3 turned =
+        Eigen::AngleAxisd(any(generator), Vec3(any(generator), any(generator), any(generator)).normalized())
+            .toRotationMatrix();
+    const Vec3 size = turned.cwiseAbs() * Vec3::Constant(half);
+    Box box;
+    box.lower = -size;
+    box.upper = size;
+    const auto grid =
+        sparse_grid([&](const Vec3& p) { return box_distance(turned.transpose() * p, Vec3::Constant(half)); }, box,
+                    voxel, 4.0 * voxel, 4.0 * voxel);
+    const Scene scene = Scene::build({implicit_instance(grid, ProxyLaw{}, GetParam())}, 0.0).value();
+    for (int n = 0; n < 400; ++n) {
+      // Straight down on the top, 0 to 6 voxels from its edge.
+      const double from_edge = 6.0 * voxel * (n / 400.0);
+      const Vec3 place(half - from_edge, 0.6 * half * any(generator), half);
+      ProxyState state;
+      touch_at(scene, state, turned * (place + Vec3(0.0, 0.0, 2e-3)));
+      const ForceSample out = touch_at(scene, state, turned * (place - Vec3(0.0, 0.0, 0.2 * voxel)));
+      if (!out.flags.has(TickFlag::contact)) continue;  // the edge itself is rounded off
+      const Vec3 normal = turned * Vec3::UnitZ();
+      const double off = std::atan2(out.wrench.force.cross(normal).norm(), out.wrench.force.dot(normal)) * degrees;
+      // A smooth cell reads nodes up to two voxels beyond its own.
+      if (from_edge > 3.0 * std::numbers::sqrt2 * voxel) {
+        EXPECT_LT(off, 0.05) << from_edge / voxel;
+      }
+      near = std::max(near, from_edge < voxel ? off : 0.0);
+    }
+  }
+  EXPECT_GT(near, 3.0);
+}
+
 TEST(ImplicitProxy, LawsWithoutAProxyKeepPushingOnAnEditedCopy) {
   const auto grid = sparse_ball(0.0008, 0.006);
-  const auto copy = std::make_shared<const SparseGrid>(SparseGrid::build(grid->source()).value());
+  // One copy is edited on the far side alone; from the other 0.3 mm are taken off all over.
+  SparseSource source = grid->source();
+  std::vector<SparseBlock> far;
+  std::vector<SparseBlock> all;
+  for (const SparseBlock& block : source.blocks) {
+    SparseBlock shaved = block;
+    for (float& value : shaved.value) value += 0.0003F;
+    if (block.at[2] < 0) far.push_back(shaved);
+    all.push_back(std::move(shaved));
+  }
+  ASSERT_FALSE(far.empty());
+  const auto elsewhere = std::make_shared<const SparseGrid>(grid->edited(far).value());
+  const auto shaved = std::make_shared<const SparseGrid>(grid->edited(all).value());
   for (const char* name : {"virtual-contact-point", "magnetic", "avila"}) {
     const Law law = law_by_name(name).value();
     const Scene scene = Scene::build({implicit_instance(grid, law)}, 0.0).value();
-    const Scene again = Scene::build({implicit_instance(copy, law)}, 0.0).value();
+    const Scene untouched = Scene::build({implicit_instance(elsewhere, law)}, 0.0).value();
+    const Scene lower = Scene::build({implicit_instance(shaved, law)}, 0.0).value();
     ProxyState state;
     touch_at(scene, state, Vec3(0, 0, 0.035));
     const Vec3 before = touch_at(scene, state, Vec3(0, 0, 0.0295)).wrench.force;
-    ASSERT_GT(before.z(), 0.3) << name;
-    EXPECT_NEAR((touch_at(again, state, Vec3(0, 0, 0.0295)).wrench.force - before).norm(), 0.0, 1e-6) << name;
+    ASSERT_NEAR(before.z(), 0.5, 0.01) << name;
+    EXPECT_NEAR((touch_at(untouched, state, Vec3(0, 0, 0.0295)).wrench.force - before).norm(), 0.0, 1e-6) << name;
+    // What is left of the old force fades; the surface under it is 0.2 mm away.
+    Vec3 after;
+    for (int i = 0; i < 400; ++i) after = touch_at(lower, state, Vec3(0, 0, 0.0295)).wrench.force;
+    EXPECT_NEAR(after.z(), 0.2, 0.01) << name;
   }
 }
 

@@ -504,11 +504,11 @@ Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept 
   return interpolated(c, place.fraction, per_voxel_);
 }
 
-Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
+template <class Take>
+bool SparseGrid::take_nodes(const Vec3& p, SparseHint& hint, const Take& take) const noexcept {
   Place place;
   double c[64];
-  if (!nodes_around<1>(p, hint, place, c)) return {outside_, Vec3::Zero()};
-  Potential out;
+  if (!nodes_around<1>(p, hint, place, c)) return false;
   for (int n = 0; n < 8; ++n) {
     const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
     double weight = 1.0;
@@ -516,10 +516,34 @@ Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noex
       const double f = place.fraction[a];
       weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
     }
-    out.value += weight * c[node];
-    out.gradient += (0.5 * weight * per_voxel_) *
-                    Vec3(c[node + 1] - c[node - 1], c[node + 4] - c[node - 4], c[node + 16] - c[node - 16]);
+    take(weight, c[node], Vec3(c[node + 1] - c[node - 1], c[node + 4] - c[node - 4], c[node + 16] - c[node - 16]));
   }
+  return true;
+}
+
+Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
+  Potential out;
+  if (!take_nodes(p, hint, [&](double weight, double value, const Vec3& difference) {
+        out.value += weight * value;
+        out.gradient += (0.5 * weight * per_voxel_) * difference;
+      }))
+    return {outside_, Vec3::Zero()};
+  return out;
+}
+
+NodeGradients SparseGrid::edge_gradients(const Vec3& p, SparseHint& hint) const noexcept {
+  NodeGradients out;
+  const double scale = 0.5 * per_voxel_;
+  double weights = 0.0;
+  take_nodes(p, hint, [&](double weight, double, const Vec3& difference) {
+    const Vec3 gradient = scale * difference;
+    const double squared = gradient.squaredNorm();
+    const double clear = weight * (squared * squared) * (squared * squared);
+    out.mean += weight * gradient;
+    out.clear += clear * gradient;
+    weights += clear;
+  });
+  if (weights > 0.0) out.clear /= weights;
   return out;
 }
 

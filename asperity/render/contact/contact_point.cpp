@@ -156,10 +156,12 @@ struct Trust {
   [[nodiscard]] double at(double g) const noexcept { return std::clamp((g + depth) / fade + 1.0, 0.0, 1.0); }
 };
 
-/// What the potential says at the probe. Force = stiffness pull, and pull = -grad energy where `trust` is 1.
+/// What the potential says at the probe. Force = stiffness pull, and pull = -grad energy where `trust` is 1 and no edge
+/// is near.
 struct Pull {
-  Vec3 pull = Vec3::Zero();  ///< m
-  double energy = 0.0;       ///< m²; 0 far outside
+  Vec3 pull = Vec3::Zero();   ///< m
+  Vec3 slope = Vec3::Zero();  ///< of the potential, as it is felt
+  double energy = 0.0;        ///< m²; 0 far outside
   double trust = 1.0;
   Vec3 foot = Vec3::Zero();  ///< of the surface that is felt
 };
@@ -176,28 +178,58 @@ Vec3 arrival_normal(const Felt& felt, const Vec3& probe, HeldPoint& state) noexc
   return view.first_touch({state.previous, probe}, Sides::front).contact.normal;
 }
 
-/// Keeps state.normal: the gradient's direction, held where that cannot be trusted. `g`: less than the band.
-Pull spring_at(const Felt& felt, const Trust& trust, double band, const Potential& here, const Vec3& probe,
-               HeldPoint& state) noexcept {
+/// Of a probe that is inside by `depth` (m): the pull per depth. The potential's own gradient; near an edge, where an
+/// energy's slope is too short to stand for the depth and its direction swings, the direction of the nodes' gradients.
+Vec3 slope_inside(double depth, const Vec3& gradient, const NodeGradients& nodes, double voxel) noexcept {
+  // Lengths of the mean gradient. A texture's slope is 1 and more; a distance's is less within two voxels of an edge.
+  constexpr double no_edge = 0.9975;
+  constexpr double at_edge = 0.975;
+  constexpr double clear = 0.95;
+  constexpr double mixed = 0.7;     // where two faces at a right angle are equally near
+  constexpr double crest = 0.25;    // less: the middle of a thin sheet, where the force turns round through 0
+  constexpr double rounding = 0.3;  // voxels: what an edge's interpolated depth lacks, by what its gradient does
+  const double length = nodes.mean.norm();
+  if (length >= no_edge) return gradient;
+  if (!(length > 0.0)) return Vec3::Zero();
+  const double share = std::min(1.0, (no_edge - length) / (no_edge - at_edge));
+  const Vec3 middle = nodes.mean / length;
+  Vec3 way = middle;
+  if (const double sharp = nodes.clear.norm(); length > mixed && sharp > 0.0) {
+    const double t = std::min(1.0, (length - mixed) / (clear - mixed));
+    way = (middle + t * t * (3.0 - 2.0 * t) * (nodes.clear / sharp - middle)).normalized();
+  }
+  const double size = std::min(1.0, length / crest) *
+                      (1.0 + rounding * (1.0 - length * length) * std::min(1.0, voxel / std::max(depth, 1e-3 * voxel)));
+  return (1.0 - share) * gradient + share * size * way;
+}
+
+/// Keeps state.normal: the pull's direction, held where that cannot be trusted. `g`: less than the band.
+Pull spring_at(const Felt& felt, const Trust& trust, double band, const Potential& here, const SparseGrid& untextured,
+               const Vec3& probe, HeldPoint& state) noexcept {
   const double g = here.value;
   Pull spring;
-  spring.foot = probe - g * here.gradient;
+  spring.slope = here.gradient;
+  // A magnet stays an energy's slope all over: what it gives on the way in is asked back on the way out.
+  if (g < 0.0 && band == 0.0)
+    spring.slope =
+        slope_inside(-g, here.gradient, untextured.edge_gradients(probe, state.cache.sparse), untextured.voxel());
+  spring.foot = probe - g * spring.slope;
   spring.trust = trust.at(g);
   if (spring.trust == 1.0) {
     constexpr double least_slope = 1e-6;
-    const double slope = here.gradient.norm();
-    if (slope > least_slope) state.normal = here.gradient / slope;
+    const double slope = spring.slope.norm();
+    if (slope > least_slope) state.normal = spring.slope / slope;
   } else if (state.normal.isZero()) {
     state.normal = arrival_normal(felt, probe, state);
   }
   if (g > 0.0) {
     const double share = g / band;
     const double window = 1.0 - share * share;
-    spring.pull = -g * window * window * here.gradient;
+    spring.pull = -g * window * window * spring.slope;
     spring.energy = -well(band) * window * window * window;
     return spring;
   }
-  spring.pull = -g * here.gradient;
+  spring.pull = -g * spring.slope;
   const double depth = std::min(-g, trust.depth);
   spring.energy = 0.5 * depth * depth - well(band);
   if (spring.trust < 1.0) {
@@ -330,7 +362,7 @@ LawForce potential_push(const ContactPointRule& rule, const ImplicitSurface& sur
     return {};
   }
   const Trust trust(surface, felt.level());
-  const Pull spring = spring_at(felt, trust, rule.band, here, probe, state);
+  const Pull spring = spring_at(felt, trust, rule.band, here, surface.untextured(), probe, state);
   const Vec3 normal = state.normal;
   const Material material = material_at(surface, own, spring.foot - rule.offset * normal, state.cache.sparse);
   const bool drags = material.dynamic_friction > 0.0 && state.retarded && !outside;
@@ -363,7 +395,7 @@ LawForce potential_push(const ContactPointRule& rule, const ImplicitSurface& sur
   answer.spring = answer.force;
   answer.stored = material.stiffness * ((drags ? 0.5 * pull.squaredNorm() - well(rule.band) : spring.energy));
   answer.keeps = spring.trust < 1.0;
-  if (!drags && !answer.keeps) answer.stiffness = material.stiffness * std::max(1.0, here.gradient.squaredNorm());
+  if (!drags && !answer.keeps) answer.stiffness = material.stiffness * std::max(1.0, spring.slope.squaredNorm());
   answer.push = outside ? 0.0 : answer.force.dot(normal);
   if (rule.band > 0.0) {
     answer.force += magnet_damping(here.value, rule.band, material.damping, normal, velocity);
