@@ -123,6 +123,8 @@
 #include "asperity/render/laws/height_field.h"
 #include "asperity/render/laws/magnetic.h"
 #include "asperity/render/laws/mesostructure.h"
+#include "asperity/render/laws/mesostructure_intended.h"
+#include "asperity/render/laws/normal_map_use.h"
 #include "asperity/render/laws/normal_perturbation.h"
 #include "asperity/render/laws/proxy.h"
 #include "asperity/render/laws/virtual_contact_point.h"

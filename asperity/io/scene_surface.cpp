@@ -98,6 +98,24 @@ Result<ScenePart<CoatSource>> read_gltf_coat(const SceneJson* json, const std::s
   return ScenePart<CoatSource>{std::move(coat), std::move(reader.canonical())};
 }
 
+/// What becomes of a normal map that a coat is given beside its heights.
+void note_normal_map(const Law& law, const Coat& coat, const std::string& name, SceneContext& context) {
+  NormalMapUse use = NormalMapUse::ignored;
+  if (const auto* proxy = law.as<ProxyLaw>()) use = proxy->normal_map;
+  if (const auto* height_field = law.as<HeightFieldLaw>()) use = height_field->normal_map;
+  if (const auto* mesostructure = law.as<MesostructureLaw>()) use = mesostructure->normal_map;
+  const bool flat = coat.lowest() == coat.highest();
+  const bool by_itself = law.facts().coat == LawCoat::directions || law.formulation() == Formulation::literal;
+  if (by_itself) return;
+  const bool felt = use == NormalMapUse::felt || (use == NormalMapUse::automatic && flat);
+  context.note(fmt::format("coat on \"{}\": its normal map {} by the law \"{}\"{}", name,
+                           felt ? "bends the force" : "is not felt", law_name(law),
+                           felt || law.facts().coat != LawCoat::moment
+                               ? ""
+                               : ", whose directions are the heights' own (\"normal_map\": \"felt\" in the law chooses "
+                                 "otherwise)"));
+}
+
 /// What can be touched, of triangles: mesh, sides, coat, features that are geometry.
 Status read_triangles(ObjectReader& reader, const Law& law, const Material& own, SceneContext& context,
                       Instance& instance, TexturePart& texture) {
@@ -163,6 +181,9 @@ Status read_triangles(ObjectReader& reader, const Law& law, const Material& own,
                     : read_coat(*coat_json, place, base.mesh(), context));
   ASPERITY_TRY(instance.surface,
                build_relief(std::move(base), std::move(coat.value), reader, context, instance.name, place));
+  const Coat& worn = (*std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface))->coat();
+  if (worn.maps().has_normal_map() && (gltf || coat_json->contains("normal_map")))
+    note_normal_map(law, worn, instance.name, context);
   if (coat_json != nullptr && coat_json->contains("closing")) {
     ASPERITY_TRY(coat.canonical["closing"], close(instance, (*coat_json)["closing"], place + ".closing", context));
   }

@@ -23,8 +23,9 @@ struct LawRegistry {
 
   LawRegistry() {
     // The one list of the laws that are built in.
-    add<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw, GeneratedGeometryLaw, DenseMeshLaw,
-        AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw, MagneticLaw, NormalPerturbationLaw>();
+    add<ProxyLaw, GodObjectLaw, ForceShadingLaw, HeightFieldLaw, MesostructureLaw, MesostructureIntendedLaw,
+        GeneratedGeometryLaw, DenseMeshLaw, AvilaLaw, CrossUncrossLaw, VirtualContactPointLaw, MagneticLaw,
+        NormalPerturbationLaw>();
     built_in = kinds.size();
   }
   template <class... L>

@@ -10,6 +10,7 @@
 #include "asperity/render/laws/height_field.h"
 #include "asperity/render/laws/magnetic.h"
 #include "asperity/render/laws/mesostructure.h"
+#include "asperity/render/laws/mesostructure_intended.h"
 #include "asperity/render/laws/normal_perturbation.h"
 #include "asperity/render/laws/proxy.h"
 #include "asperity/render/laws/virtual_contact_point.h"

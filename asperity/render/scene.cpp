@@ -283,7 +283,7 @@ InstanceFacts facts_of(const Instance& instance) {
   facts.moment = feels_changing_coat(instance);
   facts.draws = attraction_reach(instance) > 0.0;
   facts.custom = !is_built_in(instance.law);
-  facts.printed = instance.law.formulation() == Formulation::literal;
+  facts.printed = (!facts.custom && instance.law.facts().unpaid) || instance.law.formulation() == Formulation::literal;
   return facts;
 }
 

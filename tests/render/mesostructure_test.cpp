@@ -196,6 +196,83 @@ RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_under_sharp_c
   expect_gradient(*surface, scene, seed, 5e-4, 0.3);
 }
 
+// ---- as its authors meant it
+
+TEST(MesostructureIntended, bands_lie_along_edges_and_heights_are_averaged_there) {
+  // In a plane all distances agree, so that what is felt in a band is the average, and elsewhere the face's own height.
+  const auto surface = stepping_surface();
+  const TriangleMesh& mesh = surface->base().mesh();
+  const Scene scene = scene_of(surface, MesostructureIntendedLaw{});
+  Rng rng(4);
+  int in_bands = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const std::uint32_t face = random_face(rng, mesh);
+    const int edge = static_cast<int>(rng.below(3));
+    const std::uint32_t other = mesh.neighbour(face, edge);
+    if (other == no_index) continue;
+    // Beside the middle of an edge, where two faces have a say.
+    const double across = rng.uniform(0.0, 0.1);
+    const double along = rng.uniform(0.3, 0.7);
+    Vec3 barycentric;
+    barycentric[(edge + 2) % 3] = across;
+    barycentric[edge] = (1.0 - across) * along;
+    barycentric[(edge + 1) % 3] = (1.0 - across) * (1.0 - along);
+    const Vec3 p = point_on(mesh, face, barycentric);
+    const double own = surface->coat().sample(mesh, face, barycentric).height;
+    const Vec3 beyond = barycentric_frame(mesh, other).coordinates(p);
+    const double theirs = surface->coat().sample(mesh, other, beyond).height;
+    const auto weight = [](double b) {
+      const double t = std::clamp((b + rho) / (2.0 * rho), 0.0, 1.0);
+      return t * t * (3.0 - 2.0 * t);
+    };
+    const double mine = weight(barycentric.minCoeff());
+    const double yours = weight(beyond.minCoeff());
+    const double expected = across < rho ? (mine * own + yours * theirs) / (mine + yours) : own;
+    const ForceSample felt = poke(scene, p, p);
+    ASSERT_NEAR(felt.contact.penetration, expected, 1e-12) << barycentric.transpose();
+    ASSERT_NEAR(felt.wrench.force.norm(), stiffness * expected, 1e-9) << "its normal is of unit length";
+    in_bands += across < rho && std::abs(theirs - own) > 1e-5 ? 1 : 0;
+  }
+  EXPECT_GT(in_bands, 500);
+}
+
+TEST(MesostructureIntended, the_change_over_an_edge_goes_with_the_step_where_the_printed_one_jumps) {
+  const Vec3 from(-0.0093, -0.0061, 0.0);
+  const Vec3 to(0.0112, 0.0087, 0.0);
+  const auto jump = [&](const Law& law, int count) {
+    return largest_jump(slide(scene_of(stepping_surface(), law), line(from, to, count)));
+  };
+  const double coarse = jump(MesostructureIntendedLaw{}, 4000);
+  const double fine = jump(MesostructureIntendedLaw{}, 40000);
+  EXPECT_NEAR(coarse / fine, 10.0, 2.0);
+  EXPECT_GT(jump(printed, 40000), 10.0 * fine);
+  MesostructureIntendedLaw unblended;
+  unblended.blend = Blend::none;
+  EXPECT_GT(jump(unblended, 40000), 10.0 * fine);
+}
+
+TEST(MesostructureIntended, heights_below_the_base_are_met_and_contact_holds_below_it) {
+  const auto raised = coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv);
+  const Scene scene_of_waves = scene_of(raised, MesostructureIntendedLaw{});
+  const Scene printed_waves = scene_of(raised, printed);
+  int lost = 0;
+  int below = 0;
+  Rng rng(6);
+  for (int i = 0; i < 500; ++i) {
+    const std::uint32_t face = random_face(rng, raised->base().mesh());
+    const Vec3 barycentric = random_barycentric(rng, 0.1);
+    const double height = raised->coat().sample(raised->base().mesh(), face, barycentric).height;
+    // Somewhat under the relief: beneath the base where that is low.
+    const Vec3 p = point_on(raised->base().mesh(), face, barycentric) + Vec3(0.0, 0.0, height - 0.3e-3);
+    if (p.z() < -0.95e-3) continue;  // below the prisms
+    EXPECT_NEAR(poke(scene_of_waves, p, p).contact.penetration, 0.3e-3, 1e-9);
+    lost += poke(printed_waves, p, p).flags.has(TickFlag::contact) ? 0 : 1;
+    below += height < 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(below, 100);
+  EXPECT_GE(lost, below) << "heights below 0 are never met by the printed form";
+}
+
 TEST(T1_energy, no_loop_gives_or_takes_energy_under_the_consistent_mesostructure) {
   // Once with a map that runs over the edges, once with one that steps there and has to be blended.
   const std::shared_ptr<const ReliefSurface> surfaces[] = {coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv),
@@ -215,6 +292,13 @@ TEST(T1_energy, no_loop_gives_or_takes_energy_under_the_consistent_mesostructure
 TEST(Energy_erratum_10, algorithm_2_gives_0_107_mJ_a_loop_in_the_reference_case) {
   const Scene scene = scene_of(reference_surface(2e-3), printed);
   EXPECT_NEAR(std::abs(loop_work(scene, reference_loop(0.2e-3), Vec3(0.0, 1e-3, 5e-3))), 0.107e-3, 0.02 * 0.107e-3);
+}
+
+TEST(Energy_erratum_10, algorithm_2_as_it_was_meant_gives_as_much_and_below_the_base_too) {
+  // Under the base the printed form has lost contact; the signed distance keeps it.
+  const Scene scene = scene_of(reference_surface(2e-3), MesostructureIntendedLaw{});
+  for (const double lowest : {0.2e-3, -0.6e-3})
+    EXPECT_NEAR(std::abs(loop_work(scene, reference_loop(lowest), Vec3(0.0, 1e-3, 5e-3))), 0.107e-3, 0.02 * 0.107e-3);
 }
 
 TEST(Energy_erratum_10, the_consistent_mesostructure_gives_nothing_in_the_reference_case) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "asperity/core/option.h"
+#include "asperity/render/contact/normal_map.h"
 #include "asperity/render/contact/shell_contact.h"
 #include "asperity/render/touched_surface.h"
 
@@ -67,8 +68,9 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
 }
 
 /// h - H in shell coordinates, with the owner's own heights.
-LawForce consistent_force(const HeightFieldLaw& law, const ReliefView& view, double stiffness, const Vec3& probe,
-                          Contact& contact) noexcept {
+LawForce consistent_force(const HeightFieldLaw& law, const Touched& touch, double stiffness,
+                          const Vec3& probe) noexcept {
+  const ReliefView& view = touch.relief();
   const ShellContact at = shell_contact(view, probe);
   if (!at.found) return {};
   FieldSample sample = at.frame != nullptr ? view.surface().own_field(*at.frame, at.place) : view.eval(probe);
@@ -83,13 +85,17 @@ LawForce consistent_force(const HeightFieldLaw& law, const ReliefView& view, dou
     sample.gradient = gradients.height - taper.factor * height_gradient - height * taper_gradient;
     sample.height = taper.factor * height;
   }
-  return potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim, stiffness,
-                           probe, contact);
+  LawForce answer = potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim,
+                                      stiffness, probe, *touch.contact);
+  if (at.frame != nullptr)
+    turn_by_normal_map(law.normal_map, touch, sample.element, at.place.barycentric(), false, answer);
+  return answer;
 }
 
 }  // namespace
 
 void HeightFieldLaw::options(std::vector<Option>& rows) {
+  rows.push_back(normal_map_option(&HeightFieldLaw::normal_map));
   rows.push_back(option("edge_taper", &HeightFieldLaw::edge_taper, OptionType::number({0.0, 1.0 / 3.0}),
                         "share of each triangle over which heights fall to 0 towards its edges; 0 turns it off.")
                      .or_else("0; 0.05 for height-field-literal"));
@@ -100,7 +106,7 @@ LawForce HeightFieldLaw::force(const TouchedSurface& surface, const Material& ma
   const ReliefView& view = surface.touch().relief();
   return formulation == Formulation::literal
              ? literal_force(*this, view.surface(), material.stiffness, probe, view.moment())
-             : consistent_force(*this, view, material.stiffness, probe, *surface.touch().contact);
+             : consistent_force(*this, surface.touch(), material.stiffness, probe);
 }
 
 }  // namespace asperity

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "asperity/render/law.h"
+#include "asperity/render/laws/normal_map_use.h"
 
 namespace asperity {
 
@@ -26,7 +26,10 @@ struct HeightFieldLaw {
   /// 2005. 0 turns it off. In 0 … 1/3.
   double edge_taper = formulation == Formulation::literal ? literal_taper : 0.0;
 
+  NormalMapUse normal_map = NormalMapUse::automatic;  ///< consistent: whether it is felt
+
   static void options(std::vector<Option>& rows);
+  [[nodiscard]] Status validate() const { return check_normal_map(normal_map, formulation); }
   LawForce force(const TouchedSurface& surface, const Material& material, const Vec3& probe, const Vec3& velocity,
                  Seconds dt) const noexcept;
 };

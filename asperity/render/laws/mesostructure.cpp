@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/render/contact/edge_band.h"
+#include "asperity/render/contact/normal_map.h"
 #include "asperity/render/contact/shell_contact.h"
 #include "asperity/render/touched_surface.h"
 #include "asperity/surface/blend_option.h"
@@ -13,28 +15,6 @@ namespace asperity {
 
 namespace {
 
-/// Weight of one barycentric coordinate at t = (b + rho) / (2 rho).
-double literal_blend(const MesostructureLaw& law, double barycentric) noexcept {
-  const double t = std::clamp((barycentric + law.rho) / (2.0 * law.rho), 0.0, 1.0);
-  switch (law.blend) {
-    case Blend::none: return t >= 0.5 ? 1.0 : 0.0;
-    case Blend::linear: return t;
-    case Blend::s_shape: return t * t * (3.0 - 2.0 * t);
-    case Blend::quintic: return t * t * t * (10.0 + t * (6.0 * t - 15.0));
-    case Blend::image: break;
-  }
-  const double position = t * static_cast<double>(law.blend_map.size() - 1);
-  const auto cell = std::min(static_cast<std::size_t>(position), law.blend_map.size() - 2);
-  return law.blend_map[cell] + (law.blend_map[cell + 1] - law.blend_map[cell]) * (position - static_cast<double>(cell));
-}
-
-/// Weight of a face at the projection of the probe: product over its three coordinates (erratum 3).
-double face_weight(const MesostructureLaw& law, const Vec3& barycentric) noexcept {
-  double weight = 1.0;
-  for (int k = 0; k < 3; ++k) weight *= literal_blend(law, barycentric[k]);
-  return weight;
-}
-
 /// Lines 4 to 34 as printed, or with the band and the inclusion test of section 4.2, with three liberties that the text
 /// leaves no way around: the weight function (undefined there), the normals turned from each face's tangent frame into
 /// the object's, and of several prisms the one whose plane is nearest.
@@ -42,21 +22,12 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
                        const CoatMoment& moment) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
-  std::uint32_t owner = no_index;
-  double owner_distance = infinity;
-  Box around;
-  around.include(probe);
-  surface.base().index().for_each_in_box(around.grown(prisms.half_height()), [&](std::uint32_t face) {
-    if (!prisms.contains(face, probe)) return;
-    const double distance = std::abs(barycentric_frame(mesh, face).height(probe));
-    if (distance < owner_distance || (distance == owner_distance && face < owner)) {
-      owner = face;
-      owner_distance = distance;
-    }
-  });
   LawForce answer;
+  const std::uint32_t owner = prism_owner(surface, probe);
   if (owner == no_index) return answer;
-  const Vec3 barycentric = barycentric_frame(mesh, owner).coordinates(probe);
+  const BarycentricFrame own_frame = barycentric_frame(mesh, owner);
+  const double owner_distance = std::abs(own_frame.height(probe));
+  const Vec3 barycentric = own_frame.coordinates(probe);
   const CoatSample own = surface.coat_sample(owner, barycentric, moment);
   double height = own.height;
   Vec3 normal = own.normal;
@@ -69,7 +40,7 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
       if (law.test_neighbours && face != owner && !prisms.contains(face, probe)) return;
       const BarycentricFrame frame = barycentric_frame(mesh, face);
       const Vec3 coordinates = frame.coordinates(probe);
-      const double weight = face_weight(law, coordinates);
+      const double weight = band_weight(law, coordinates);
       if (weight <= 0.0) return;
       const CoatSample sample = surface.coat_sample(face, coordinates, moment);
       height_sum += weight * sample.height;
@@ -94,12 +65,17 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
 }
 
 /// Phi of the relief in shell coordinates (formulation D2, D3).
-LawForce consistent_force(const ReliefView& view, double stiffness, const Vec3& probe, Contact& contact) noexcept {
+LawForce consistent_force(const MesostructureLaw& law, const Touched& touch, double stiffness,
+                          const Vec3& probe) noexcept {
+  const ReliefView& view = touch.relief();
   const ShellContact at = shell_contact(view, probe);
   if (!at.found) return {};
   const FieldSample sample = at.frame != nullptr ? view.surface().field(*at.frame, at.place) : view.eval(probe);
-  return potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim, stiffness,
-                           probe, contact);
+  LawForce answer = potential_contact(sample.value, sample.gradient, sample.height, sample.element, at.beyond_rim,
+                                      stiffness, probe, *touch.contact);
+  if (at.frame != nullptr)
+    turn_by_normal_map(law.normal_map, touch, sample.element, at.place.barycentric(), false, answer);
+  return answer;
 }
 
 }  // namespace
@@ -115,9 +91,11 @@ void MesostructureLaw::options(std::vector<Option>& rows) {
                         "every neighbouring prism that holds the probe has a say (hrm-2010, 4.2), not those in the "
                         "band alone.")
                      .of_printed_form(why));
+  rows.push_back(normal_map_option(&L::normal_map));
 }
 
 Status MesostructureLaw::validate() const {
+  ASPERITY_CHECK(check_normal_map(normal_map, formulation));
   return asperity::validate(Stitching{FoldMode::keep, blend, rho, blend_map});
 }
 
@@ -126,7 +104,7 @@ LawForce MesostructureLaw::force(const TouchedSurface& surface, const Material& 
   const ReliefView& view = surface.touch().relief();
   return formulation == Formulation::literal
              ? literal_force(*this, view.surface(), material.stiffness, probe, view.moment())
-             : consistent_force(view, material.stiffness, probe, *surface.touch().contact);
+             : consistent_force(*this, surface.touch(), material.stiffness, probe);
 }
 
 }  // namespace asperity

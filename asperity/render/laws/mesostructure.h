@@ -1,6 +1,6 @@
 #pragma once
 
-#include "asperity/render/law.h"
+#include "asperity/render/laws/normal_map_use.h"
 #include "asperity/surface/stitching.h"
 
 namespace asperity {
@@ -25,6 +25,7 @@ struct MesostructureLaw {
   /// literal: the blend on the fly of section 4.2. Within the band around any edge heights and normals are averaged
   /// over every neighbouring prism that holds the probe.
   bool test_neighbours = false;
+  NormalMapUse normal_map = NormalMapUse::automatic;  ///< consistent: whether it is felt
 
   static void options(std::vector<Option>& rows);
   [[nodiscard]] Status validate() const;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "asperity/render/law.h"
+#include "asperity/render/laws/normal_map_use.h"
 
 namespace asperity {
 
@@ -15,6 +15,11 @@ struct ProxyLaw {
                                   .coat = LawCoat::moment,
                                   .linear = true,
                                   .compared = on_mesh | on_relief | on_iso | on_implicit};
+  NormalMapUse normal_map = NormalMapUse::automatic;  ///< of a coat
+
+  static void options(std::vector<Option>& rows) { rows.push_back(normal_map_option(&ProxyLaw::normal_map)); }
+  /// Turns its force on a coat. [servo]
+  void finish(const Touched& touch, const Foot& contact, LawForce& answer) const noexcept;
 };
 
 }  // namespace asperity

@@ -87,6 +87,7 @@ void to_world(const Touched& touch, LawForce& law) noexcept {
   law.spring = touch.turned(law.spring);
   law.friction = touch.turned(law.friction);
   law.texture = touch.turned(law.texture);
+  if (law.turns) law.turn = touch.turned(law.turn);
   law.point = touch.to_world(law.point);
   law.normal = touch.turned(law.normal);
 }

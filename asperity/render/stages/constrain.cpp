@@ -58,8 +58,9 @@ void answer_at_rest(const View& view, const PointProxy<View>& point, const Point
   surface.places[0].element = law.element;
   if constexpr (triangles) {
     surface.height = point.place().side() * view.skin();
-    finish_by_law(touch, {foot, rest.normal, 0.0, law.element, point.place().at}, law);
   }
+  if constexpr (triangles || std::is_same_v<View, ReliefView>)
+    finish_by_law(touch, {foot, rest.normal, 0.0, law.element, point.place().at}, law);
   // Of the bare mesh under it, should the scene take the coat away.
   if constexpr (std::is_same_v<View, ReliefView>) surface.height = point.place().side() * view.surface().base().skin();
   if (!rest.pulls) {
