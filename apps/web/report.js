@@ -356,25 +356,22 @@ window.addEventListener("error", (event) => {
 
   function draw_detection() {
     if (!data.detection || data.detection.length === 0) return;
-    section("Detection of thin layers", "Share of straight passages through the isosurface of a linear field, each from a random start, in which a law answered with a contact. " +
+    section("Detection at speed", "Share of straight passages through the isosurface, at places of the stroke and each from a random start, in which a law answered with a contact. " +
       "Expected: of avila, min(1, layer / distance in a tick).");
+    const names = data.laws.map((law) => law.law);
     const table = make(make(page, "div", "scroll"), "table");
     const head = make(make(table, "thead"), "tr");
-    for (const name of ["layer (mm)", "speed (m/s)", "expected", "avila", "cross-uncross", "proxy"]) make(head, "th", "", name);
+    for (const name of ["speed (m/s)", "layer (mm)", "expected", ...names]) make(head, "th", "", name);
     const body = make(table, "tbody");
-    for (const [layer, speed, ...shares] of data.detection) {
+    for (const [speed, layer, ...shares] of data.detection) {
       const row = make(body, "tr");
-      make(row, "td", "", number(layer));
       make(row, "td", "", number(speed));
+      make(row, "td", "", number(layer));
       for (const share of shares) make(row, "td", "", percent(share));
     }
-    const layers = [...new Set(data.detection.map((row) => row[0]))];
-    const curves = [...layers.map((layer) => [`avila, ${number(layer)} mm`, layer, 3]), ["cross-uncross", layers[0], 4], ["proxy", layers[0], 5]];
-    const speeds = [...new Set(data.detection.map((row) => row[1]))].sort((a, b) => a - b);
-    const at = (layer, speed, column) => 100 * data.detection.find((row) => row[0] === layer && row[1] === speed)[column];
-    plot(page, { title: "Detected over speed", x: "speed (m/s)", y: "%", unit: "m/s", zero: true, labels: ["speed", ...curves.map((curve) => curve[0])],
-      colours: curves.map((_, k) => law_colours[k % law_colours.length]), series: { proxy: { strokePattern: [7, 4] } },
-      rows: speeds.map((speed) => [speed, ...curves.map(([, layer, column]) => at(layer, speed, column))]) });
+    plot(page, { title: "Detected over speed", x: "speed (m/s)", y: "%", unit: "m/s", zero: true, labels: ["speed", ...names],
+      colours: names.map((_, k) => law_colours[k % law_colours.length]), series: {},
+      rows: data.detection.map(([speed, , , ...shares]) => [speed, ...shares.map((share) => share == null ? null : 100 * share)]) });
   }
 
   function draw_compare() {

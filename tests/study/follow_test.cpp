@@ -87,33 +87,20 @@ TEST(FollowError, IsTheShareOfTheLargestDeviationInTheVolume) {
 
 // --- detection ---
 
-TEST(DetectionTable, MissesWithM1WhatTheSamplingSaysAndNothingWithTheOthers) {
-  DetectionSettings settings;
-  settings.thicknesses = {0.05e-3, 0.3e-3};
-  settings.speeds = {0.01, 0.2, 0.5, 20.0};
-  settings.passages = 1500;
-  const auto rows = detection_table(settings);
-  ASSERT_TRUE(rows.ok()) << rows.error().message();
-  ASSERT_EQ(rows->size(), 8u);
-  EXPECT_NEAR((*rows)[1].expected, 0.35, 1e-9);
-  EXPECT_NEAR((*rows)[2].expected, 0.14, 1e-9);
-  for (const DetectionRow& row : *rows) {
-    const double deviation = std::sqrt(row.expected * (1.0 - row.expected) / settings.passages);
-    EXPECT_NEAR(row.avila, row.expected, 4.0 * deviation + 1e-12) << row.thickness << " " << row.speed;
-    EXPECT_EQ(row.cross_uncross, 1.0) << row.thickness << " " << row.speed;
-    EXPECT_EQ(row.proxy, 1.0) << row.thickness << " " << row.speed;
-  }
-}
-
 TEST(DetectionTable, RefusesBadSettingsByName) {
-  const auto place_of = [](DetectionSettings settings) {
-    const auto rows = detection_table(settings);
+  const auto place_of = [](const DetectionSettings& settings) {
+    const auto rows = detection_table({}, {}, settings);
     return rows.ok() ? std::string("accepted") : rows.error().place;
   };
-  EXPECT_EQ(place_of({{0.0}, {0.1}, 1000.0, 10, 1}), "thicknesses[0]");
-  EXPECT_EQ(place_of({{1e-3}, {0.1, nan}, 1000.0, 10, 1}), "speeds[1]");
-  EXPECT_EQ(place_of({{1e-3}, {0.1}, 0.0, 10, 1}), "rate");
-  EXPECT_EQ(place_of({{1e-3}, {0.1}, 1000.0, 0, 1}), "passages");
+  EXPECT_EQ(place_of({}), "accepted");
+  EXPECT_EQ(place_of({{0.1, nan}, 1000.0, 10, 1}), "speeds[1]");
+  EXPECT_EQ(place_of({{0.1}, 0.0, 10, 1}), "rate");
+  EXPECT_EQ(place_of({{0.1}, 1000.0, 0, 1}), "passages");
+}
+
+TEST(DetectionTable, IsEmptyWithoutAnIsosurface) {
+  const Scene bare[] = {synthetic::bare_scene()};
+  EXPECT_TRUE(detection_table(bare, synthetic::line_path()).value().empty());
 }
 
 // --- runs on a volume ---

@@ -1,4 +1,5 @@
-// large-data-2008 on its own task: who stays on the isosurface, by how much, and what of it is felt (rows M-5, M-6).
+// large-data-2008 on its own task: who notices the isosurface, who stays on it, by how
+// much, and what of it is felt (rows M-3, M-5, M-6).
 
 #include <gtest/gtest.h>
 
@@ -6,6 +7,7 @@
 #include <iostream>
 #include <numbers>
 
+#include "asperity/core/rng.h"
 #include "asperity/device/ideal_probe.h"
 #include "asperity/device/simulated_device.h"
 #include "asperity/field/volume/generators.h"
@@ -13,11 +15,172 @@
 #include "asperity/render/laws.h"
 #include "asperity/render/step.h"
 #include "asperity/servo/session.h"
+#include "asperity/study/follow.h"
 #include "asperity/study/metrics.h"
 #include "asperity/study/spectrum.h"
+#include "tests/render/volumes.h"
 
 namespace asperity::large_data_test {
 namespace {
+
+// --- M-3: who notices ---
+
+constexpr int passages = 1500;
+constexpr double loop_rate = 1400.0;  // Hz, the paper's
+
+/// An isosurface as M1 feels it, with a layer of `band`, M2 and the proxy.
+std::vector<Scene> three_laws(const std::shared_ptr<const IsoSurface>& surface, double band, const Pose& pose = {}) {
+  std::vector<Scene> scenes;
+  AvilaLaw m1;
+  m1.band = band;
+  for (const Law& law : {Law(m1), Law(CrossUncrossLaw{}), Law(ProxyLaw{})}) {
+    std::vector<Instance> instances(1);
+    instances[0].name = "sheet";
+    instances[0].surface = surface;
+    instances[0].law = law;
+    instances[0].world_from_object = pose;
+    scenes.push_back(Scene::build(std::move(instances), 0.0).value());
+  }
+  return scenes;
+}
+
+/// Along y over 20 mm, where `height(y)` is the sheet's x.
+template <class Height>
+StrokePath over(const Height& height, const Pose& pose = {}) {
+  StrokeSettings settings;
+  settings.start = pose.apply(Vec3(0.0, -0.01, 0.0));
+  settings.end = pose.apply(Vec3(0.0, 0.01, 0.0));
+  return build_stroke(
+             settings,
+             [&](const Vec3& p) {
+               const Vec3 at = pose.apply_inverse(p);
+               return SurfacePoint{pose.apply(Vec3(height(at.y()), at.y(), at.z())), pose.rotate(Vec3::UnitX())};
+             })
+      .value();
+}
+
+std::vector<DetectionRow> detected(const std::vector<Scene>& scenes, const StrokePath& path) {
+  DetectionSettings settings;
+  settings.speeds = {0.02, 0.2, 0.5, 5.0};
+  settings.rate = loop_rate;
+  settings.passages = passages;
+  return detection_table(scenes, path, settings).value();
+}
+
+/// Four standard deviations of a share of so many passages; none where the share is certain.
+void expect_share(double share, double law, double slack = 0.0) {
+  EXPECT_NEAR(share, law, 4.0 * std::sqrt(law * (1.0 - law) / passages) + slack + 1e-12);
+}
+
+TEST(Rows, M3_M1MissesFlatSheetsAsTheSamplingSaysAndM2None) {
+  constexpr double slope = 1e4;
+  constexpr double thickness = 0.05e-3;
+  const auto surface =
+      volumes::surface_of(volumes::sampled(volumes::cube(0.02, 8), [](const Vec3& p) { return slope * p.x(); }), 0.0);
+  // Wherever it lies.
+  const Pose pose{Vec3(0.1, -0.2, 0.3), Quat(Eigen::AngleAxisd(0.7, Vec3(1.0, 2.0, -1.0).normalized()))};
+  const auto rows = detected(three_laws(surface, slope * thickness, pose), over([](double) { return 0.0; }, pose));
+  ASSERT_EQ(rows.size(), 4U);
+  // The checklist's figures: 0.35 at 0.2 m/s, 0.14 at 0.5 m/s.
+  const double figures[] = {1.0, 0.35, 0.14, 0.014};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    SCOPED_TRACE(rows[i].speed);
+    EXPECT_NEAR(rows[i].layer, thickness, 1e-3 * thickness);
+    EXPECT_NEAR(rows[i].expected, figures[i], 1e-3 * figures[i]);
+    expect_share(rows[i].share[0], figures[i]);
+    EXPECT_EQ(rows[i].share[1], 1.0);
+    EXPECT_EQ(rows[i].share[2], 1.0);
+  }
+}
+
+TEST(Rows, M3_M1MissesCurvedSheetsAsTheSamplingSaysAndM2None) {
+  // A ball of 15 mm in a field of distances: the layer is as thick as its band.
+  constexpr double thickness = 0.05e-3;
+  constexpr double radius = 0.015;
+  const auto surface =
+      volumes::surface_of(volumes::sampled(volumes::cube(0.025, 101), [](const Vec3& p) { return p.norm(); }), radius);
+  const auto height = [](double y) { return std::sqrt(radius * radius - y * y); };
+  for (const DetectionRow& row : detected(three_laws(surface, thickness), over(height))) {
+    SCOPED_TRACE(row.speed);
+    const double law = std::min(1.0, thickness * loop_rate / row.speed);
+    // Cells of 0.5 mm on a radius of 15 mm: the sampled distance's slope is off by (h / r)^2 = 0.1 %.
+    expect_share(row.share[0], law, 2e-3 * law);
+    EXPECT_EQ(row.share[1], 1.0);
+    EXPECT_EQ(row.share[2], 1.0);
+  }
+}
+
+TEST(Rows, M3_M1MissesNoisySheetsAsTheSamplingSaysAndM2None) {
+  // x = n(y, z), eight random waves of 3 to 10 mm and slopes up to 1, in a field whose slope varies with the noise too.
+  struct Wave {
+    double ky, kz, phase;
+  };
+  std::vector<Wave> waves;
+  Rng rng(5);
+  for (int i = 0; i < 8; ++i) {
+    const double k = 2.0 * std::numbers::pi / rng.uniform(3e-3, 10e-3);
+    const double turn = rng.uniform(0.0, 2.0 * std::numbers::pi);
+    waves.push_back({k * std::cos(turn), k * std::sin(turn), rng.uniform(0.0, 2.0 * std::numbers::pi)});
+  }
+  const auto height = [&](double y, double z) {
+    double sum = 0.0;
+    for (const Wave& w : waves) sum += 1e-4 * std::cos(w.ky * y + w.kz * z + w.phase);
+    return sum;
+  };
+  const auto slope = [](double y) { return 1e4 * (1.0 + 0.8 * std::sin(900.0 * y)); };
+  const auto surface = volumes::surface_of(
+      volumes::sampled(
+          {GridAxis::uniform(-0.005, 0.25e-3, 41).value(), GridAxis::uniform(-0.0125, 0.25e-3, 101).value(),
+           GridAxis::uniform(-0.0025, 0.25e-3, 21).value()},
+          [&](const Vec3& p) { return slope(p.y()) * (p.x() - height(p.y(), p.z())); }),
+      0.0);
+  constexpr double band = 0.5;
+  const StrokePath path = over([&](double y) { return height(y, 0.0); });
+  const auto rows = detected(three_laws(surface, band), path);
+  ASSERT_EQ(rows.size(), 4U);
+  for (const DetectionRow& row : rows) {
+    SCOPED_TRACE(row.speed);
+    // Over the way: the layer is band / |grad phi| thick, |grad phi| = slope sqrt(1 + |grad n|^2) on the sheet.
+    double law = 0.0;
+    double spread = 0.0;
+    for (const Vec3& p : path.points()) {
+      Vec2 gradient = Vec2::Zero();
+      for (const Wave& w : waves) gradient -= 1e-4 * std::sin(w.ky * p.y() + w.kz * p.z() + w.phase) * Vec2(w.ky, w.kz);
+      const double thickness = band / (slope(p.y()) * std::sqrt(1.0 + gradient.squaredNorm()));
+      const double one = std::min(1.0, thickness * loop_rate / row.speed);
+      law += one / static_cast<double>(path.points().size());
+      spread += one * one / static_cast<double>(path.points().size());
+    }
+    EXPECT_GT(spread - law * law, row.speed > 0.1 && row.speed < 1.0 ? 1e-3 : 0.0) << "layers differ along the way";
+    // Waves of 12 cells and more: the sampled slope is off by (k h)^2 / 6 at most, of the noise's share.
+    expect_share(row.share[0], law, 0.02 * law);
+    EXPECT_NEAR(row.expected, law, 0.05 * law);
+    EXPECT_EQ(row.share[1], 1.0);
+    EXPECT_EQ(row.share[2], 1.0);
+  }
+}
+
+TEST(Rows, M3_SheetsWithinACellArePassedByM1AndM2AsTheSamplingSaysAndByTheProxyNever) {
+  // Low within 50 um of x = 0, in cells of 1 mm: both faces in neighbouring cells. Whoever crosses and uncrosses within
+  // a tick is outside again, so that M2 has nothing left to feel (large-data-2008, section 4.2): it notices the sheet
+  // where a tick ends in it, as M1 does.
+  constexpr double half = 0.05e-3;
+  auto grid = volumes::sampled(volumes::cube(0.02, 41), [](const Vec3& p) { return std::abs(p.x()); });
+  const auto surface = volumes::surface_of(
+      std::make_shared<const ScalarField>(ScalarGrid(*grid->grid()), CellReconstruction::trilinear), half);
+  const auto rows = detected(three_laws(surface, 1.0), over([](double) { return half; }));
+  ASSERT_EQ(rows.size(), 4U);
+  for (const DetectionRow& row : rows) {
+    SCOPED_TRACE(row.speed);
+    const double law = std::min(1.0, 2.0 * half * loop_rate / row.speed);
+    EXPECT_NEAR(row.layer, 2.0 * half, 1e-3 * half);
+    expect_share(row.share[0], law);
+    expect_share(row.share[1], law);
+    EXPECT_EQ(row.share[2], 1.0);
+  }
+}
+
+// --- M-5: who stays on it ---
 
 Experiment scene(const char* name, const Law& law) {
   return with_law(parse_experiment(builtin_scene_json(name).value(), ".", name).value(), law).value();
@@ -180,6 +343,8 @@ TEST(Rows, M5_ErrorOnTheCavityIsItsSlopeTimesForceOverStiffness) {
             << 1e6 * cavity.device.position_resolution << " um, narrowest cell "
             << 1e6 * surface.field().narrowest_cell() << " um\n";
 }
+
+// --- M-6: what is felt ---
 
 /// Amplitude of the undulation in what is felt, over whole waves of the contact phase's second half.
 double undulation(const Experiment& experiment, double wave) {

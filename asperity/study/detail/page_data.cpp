@@ -213,12 +213,14 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
                                               per_millimetre(m.spectrum.tangential_distance))}};
 }
 
-/// Rows [layer in mm, speed in m/s, expected of M1, M1, M2, proxy], shares.
+/// Rows [speed in m/s, layer in mm, expected of M1, share of each law ...].
 json detection_data(const std::vector<DetectionRow>& rows) {
   json data = json::array();
-  for (const DetectionRow& row : rows)
-    data.push_back({significant(row.thickness * milli), significant(row.speed), significant(row.expected),
-                    significant(row.avila), significant(row.cross_uncross), significant(row.proxy)});
+  for (const DetectionRow& row : rows) {
+    json entry{significant(row.speed), significant(row.layer * milli), significant(row.expected)};
+    for (const double share : row.share) entry.push_back(significant(share));
+    data.push_back(std::move(entry));
+  }
   return data;
 }
 
