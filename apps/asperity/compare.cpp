@@ -191,6 +191,10 @@ void print_loop_rates(const std::vector<LoopRateRow>& rows, const std::vector<Co
       std::cout << fmt::format("{:>24}", fmt::format("{}, {:.0f} kHz", format_seconds(p50), 1e-3 / p50));
     std::cout << '\n';
   }
+  std::cout << fmt::format("{:>12}{:>12}", "beside it", "");
+  for (const double bytes : rows.back().law_bytes)
+    std::cout << fmt::format("{:>24}", fmt::format("{:.0f} bytes", bytes));
+  std::cout << '\n';
 }
 
 /// The scene as each of the laws feels it; none where nothing is followed.
@@ -217,7 +221,8 @@ Result<std::vector<LoopRateRow>> rates_of(const Experiment& experiment, std::spa
 Json loop_rate_json(const std::vector<LoopRateRow>& rows) {
   Json list = Json::array();
   for (const LoopRateRow& row : rows)
-    list.push_back({{"samples", row.samples}, {"bytes", row.bytes}, {"update_p50_s", row.p50}});
+    list.push_back(
+        {{"samples", row.samples}, {"bytes", row.bytes}, {"law_bytes", row.law_bytes}, {"update_p50_s", row.p50}});
   return list;
 }
 

@@ -335,23 +335,24 @@ window.addEventListener("error", (event) => {
 
   function draw_loop_rate() {
     if (!data.loop_rate || data.loop_rate.length === 0) return;
-    section("Loop rate over the size of the data", "The same isosurface on every eighth, fourth, second and every sample along each axis: median time of a tick on the machine named below.");
+    section("Loop rate over the size of the data", "The same isosurface on every eighth, fourth, second and every sample along each axis: median time of a tick on the machine named below, the least of five rounds. Memory is of volume and octree, which all laws feel; what a law adds is what it remembers and what was made for it.");
     const names = data.laws.map((law) => law.law);
     const table = make(make(page, "div", "scroll"), "table");
     const head = make(make(table, "thead"), "tr");
-    for (const name of ["samples", "memory (MB)", ...names.map((name) => `${name} (\u00b5s)`), ...names.map((name) => `${name} (kHz)`)]) make(head, "th", "", name);
+    for (const name of ["samples", "memory (MB)", ...names.map((name) => `${name} adds (bytes)`), ...names.map((name) => `${name} (\u00b5s)`), ...names.map((name) => `${name} (kHz)`)]) make(head, "th", "", name);
     const body = make(table, "tbody");
-    for (const [samples, megabytes, ...times] of data.loop_rate) {
+    for (const [samples, megabytes, added, ...times] of data.loop_rate) {
       const row = make(body, "tr");
       make(row, "td", "", String(samples));
       make(row, "td", "", number(megabytes));
+      for (const bytes of added) make(row, "td", "", String(bytes));
       for (const time of times) make(row, "td", "", number(time));
       for (const time of times) make(row, "td", "", number(1e3 / time));
     }
     if (data.loop_rate.length > 1)
       plot(page, { title: "Time of a tick", x: "log2 of the samples", y: "\u00b5s", unit: "", zero: true, labels: ["size", ...names],
         colours: names.map((_, k) => law_colours[k % law_colours.length]), series: {},
-        rows: data.loop_rate.map(([samples, , ...times]) => [Math.log2(samples), ...times]) });
+        rows: data.loop_rate.map(([samples, , , ...times]) => [Math.log2(samples), ...times]) });
   }
 
   function draw_detection() {

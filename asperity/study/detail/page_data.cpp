@@ -224,11 +224,11 @@ json detection_data(const std::vector<DetectionRow>& rows) {
   return data;
 }
 
-/// Rows [samples, MB, microseconds a tick of each law ...].
+/// Rows [samples, MB of the volume, [bytes more of each law], microseconds a tick of each law ...].
 json loop_rate_data(const std::vector<LoopRateRow>& rows) {
   json data = json::array();
   for (const LoopRateRow& row : rows) {
-    json entry{row.samples, significant(row.bytes * 1e-6)};
+    json entry{row.samples, significant(row.bytes * 1e-6), row.law_bytes};
     for (const double p50 : row.p50) entry.push_back(significant(p50 * 1e6));
     data.push_back(std::move(entry));
   }
