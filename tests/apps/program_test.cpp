@@ -263,6 +263,25 @@ TEST_F(Program, CompareDetectsOnTheSceneItself) {
   }
 }
 
+/// Vorticity of a kitchen's air: from a fifth of its range on its surfaces lie on the volume's border.
+TEST_F(Program, TouchMeetsSurfacesOnTheBorderOfAVolume) {
+  const fs::path kitchen = fs::path(ASPERITY_SHARED_DATA) / "volumes" / "kitchen.vtk";
+  if (!fs::exists(kitchen)) GTEST_SKIP() << "shared data are not here";
+  for (const char* threshold : {"20 %", "30 %", "40 %", "50 %"}) {
+    SCOPED_TRACE(threshold);
+    const json scene{{"surfaces",
+                      {{{"volume", {{"file", kitchen.string()}, {"derive", "vorticity_magnitude"}}},
+                        {"iso", {{"threshold", threshold}, {"inside", "high"}}}}}}};
+    write("kitchen.json", scene.dump());
+    const Call call = run("touch kitchen.json --no-report --json --out kitchen");
+    ASSERT_EQ(call.code, 0) << call.err;
+    const json document = json::parse(call.out);
+    EXPECT_TRUE(document["warnings"].empty()) << document["warnings"];
+    const double contact = document["metrics"]["ticks"]["contact"].get<double>();
+    EXPECT_GT(contact, 0.25 * document["ticks"].get<double>());
+  }
+}
+
 TEST_F(Program, InspectKnowsEveryKindOfFile) {
   ASSERT_EQ(run("touch quick.json --no-report").code, 0);
   const auto kind = [&](const std::string& file) {
