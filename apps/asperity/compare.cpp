@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <span>
 
 #include "apps/asperity/rival.h"
 #include "apps/asperity/run.h"
@@ -156,27 +157,26 @@ void print_table(const Experiment& experiment, const std::vector<Column>& column
   }
 }
 
-/// Who notices layers as thin as the paper's, and as M1's own on the scene.
-Result<std::vector<DetectionRow>> detect_layers(const Experiment& experiment) {
-  const Instance* instance = followed_instance(experiment.scene);
-  if (instance == nullptr) return std::vector<DetectionRow>{};
+/// Who notices the scene's isosurface, at speeds up to those that miss it.
+Result<std::vector<DetectionRow>> detect(const Experiment& experiment, std::span<const Scene> felt) {
   DetectionSettings settings;
-  settings.thicknesses = {0.05e-3, AvilaLaw{}.largest_force / instance->material.stiffness};
   settings.speeds = {0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0};
   settings.rate = experiment.rate;
   settings.passages = 300;
-  return detection_table(settings);
+  return detection_table(felt, experiment.path, settings);
 }
 
-void print_detection(const std::vector<DetectionRow>& rows) {
+void print_detection(const std::vector<DetectionRow>& rows, const std::vector<Column>& columns) {
   if (rows.empty()) return;
-  std::cout << fmt::format("{:>12}{:>12}{:>12}{:>12}{:>16}{:>12}\n", "layer", "speed", "expected", "avila",
-                           "cross-uncross", "proxy");
+  std::cout << fmt::format("{:>12}{:>12}{:>12}", "speed", "layer", "expected");
+  for (const Column& column : columns) std::cout << fmt::format("{:>24}", column.entry.law);
+  std::cout << '\n';
+  const auto share = [](double value) { return number(value * 100.0, "{:.0f} %"); };
   for (const DetectionRow& row : rows) {
-    const auto share = [](double value) { return number(value * 100.0, "{:.0f} %"); };
-    std::cout << fmt::format("{:>12}{:>12}{:>12}{:>12}{:>16}{:>12}\n", format_length(row.thickness),
-                             fmt::format("{:g} m/s", row.speed), share(row.expected), share(row.avila),
-                             share(row.cross_uncross), share(row.proxy));
+    std::cout << fmt::format("{:>12}{:>12}{:>12}", fmt::format("{:g} m/s", row.speed),
+                             std::isfinite(row.layer) ? format_length(row.layer) : "-", share(row.expected));
+    for (const double one : row.share) std::cout << fmt::format("{:>24}", share(one));
+    std::cout << '\n';
   }
 }
 
@@ -191,37 +191,47 @@ void print_loop_rates(const std::vector<LoopRateRow>& rows, const std::vector<Co
       std::cout << fmt::format("{:>24}", fmt::format("{}, {:.0f} kHz", format_seconds(p50), 1e-3 / p50));
     std::cout << '\n';
   }
+  std::cout << fmt::format("{:>12}{:>12}", "beside it", "");
+  for (const double bytes : rows.back().law_bytes)
+    std::cout << fmt::format("{:>24}", fmt::format("{:.0f} bytes", bytes));
+  std::cout << '\n';
+}
+
+/// The scene as each of the laws feels it; none where nothing is followed.
+Result<std::vector<Scene>> felt_scenes(const Experiment& experiment, const std::vector<Rival>& rivals) {
+  std::vector<Scene> felt;
+  if (followed_instance(experiment.scene) == nullptr) return felt;
+  for (const Rival& rival : rivals) {
+    ASPERITY_TRY(Experiment changed, felt_by(experiment, rival));
+    felt.push_back(std::move(changed.scene));
+  }
+  return felt;
 }
 
 /// How long a tick takes over the size of the scene's volumes.
-Result<std::vector<LoopRateRow>> rates_of(const Experiment& experiment, const std::vector<Rival>& rivals,
+Result<std::vector<LoopRateRow>> rates_of(const Experiment& experiment, std::span<const Scene> felt,
                                           const Progress& progress) {
-  if (followed_instance(experiment.scene) == nullptr) return std::vector<LoopRateRow>{};
+  if (felt.empty()) return std::vector<LoopRateRow>{};
   if (progress) progress("measuring the loop rate", 0.0);
-  std::vector<Law> felt;
-  for (const Rival& rival : rivals) {
-    ASPERITY_TRY(const Experiment changed, felt_by(experiment, rival));
-    felt.push_back(changed.scene.instances().front().law);
-  }
-  return loop_rates(experiment.scene, experiment.path, felt, experiment.rate);
+  std::vector<Law> laws;
+  for (const Scene& scene : felt) laws.push_back(scene.instances().front().law);
+  return loop_rates(experiment.scene, experiment.path, laws, experiment.rate);
 }
 
 Json loop_rate_json(const std::vector<LoopRateRow>& rows) {
   Json list = Json::array();
   for (const LoopRateRow& row : rows)
-    list.push_back({{"samples", row.samples}, {"bytes", row.bytes}, {"update_p50_s", row.p50}});
+    list.push_back(
+        {{"samples", row.samples}, {"bytes", row.bytes}, {"law_bytes", row.law_bytes}, {"update_p50_s", row.p50}});
   return list;
 }
 
-Json detection_json(const std::vector<DetectionRow>& rows) {
+Json detection_json(const std::vector<DetectionRow>& rows, const std::vector<Column>& columns) {
   Json list = Json::array();
   for (const DetectionRow& row : rows) {
-    list.push_back({{"thickness", row.thickness},
-                    {"speed", row.speed},
-                    {"expected", row.expected},
-                    {"avila", row.avila},
-                    {"cross_uncross", row.cross_uncross},
-                    {"proxy", row.proxy}});
+    Json shares = Json::object();
+    for (std::size_t i = 0; i < columns.size(); ++i) shares[columns[i].entry.law] = row.share[i];
+    list.push_back({{"speed", row.speed}, {"layer", row.layer}, {"expected", row.expected}, {"share", shares}});
   }
   return list;
 }
@@ -262,15 +272,16 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     ASPERITY_TRY(Column column, run_law(*felt, rival, {exact, representations.edge_reach()}, progress));
     columns.push_back(std::move(column));
   }
-  ASPERITY_TRY(const std::vector<LoopRateRow> rates, rates_of(experiment, rivals, progress));
-  ASPERITY_TRY(const std::vector<DetectionRow> detection, detect_layers(experiment));
+  ASPERITY_TRY(const std::vector<Scene> felt, felt_scenes(experiment, rivals));
+  ASPERITY_TRY(const std::vector<LoopRateRow> rates, rates_of(experiment, felt, progress));
+  ASPERITY_TRY(const std::vector<DetectionRow> detection, detect(experiment, felt));
   Json document{{"program", program_name()},
                 {"command", console.command_line},
                 {"scene", experiment.name},
                 {"notes", experiment.notes}};
   for (const Column& column : columns) document["laws"].push_back(law_json_of(column));
   if (!rates.empty()) document["loop_rate"] = loop_rate_json(rates);
-  if (!detection.empty()) document["detection"] = detection_json(detection);
+  if (!detection.empty()) document["detection"] = detection_json(detection, columns);
   if (!options.no_report) {
     CompareReport report;
     report.origin = report_origin(experiment, console);
@@ -293,7 +304,7 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
   } else {
     print_table(experiment, columns);
     print_loop_rates(rates, columns);
-    print_detection(detection);
+    print_detection(detection, columns);
     std::cout << (options.no_report ? "numbers " + (folder / "compare.json").string()
                                     : "report  " + (folder / "report.html").string())
               << '\n';

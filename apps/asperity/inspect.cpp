@@ -120,6 +120,10 @@ Findings scene_findings(const Experiment& experiment, double smooth) {
   found.fact("duration", fmt::format("{:.3g} s, {} ticks", experiment.path.duration().count(),
                                      session_ticks(experiment.path.duration(), Seconds(1.0 / experiment.rate))));
   found.fact("memory", fmt::format("{:.2f} MB", static_cast<double>(experiment.scene.memory_bytes()) * 1e-6));
+  for (const Instance& instance : experiment.scene.instances()) {
+    found.fact(fmt::format("of it for law \"{}\" on \"{}\"", law_name(instance.law), instance.name),
+               fmt::format("{} bytes", law_bytes(instance)));
+  }
   for (const std::string& note : experiment.notes) found.problems.push_back(note);
   for (const Instance& instance : experiment.scene.instances()) {
     for (std::string& line : feel_of(experiment, instance))

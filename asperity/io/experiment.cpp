@@ -226,8 +226,13 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   }
   ASPERITY_TRY(Scene scene, Scene::build(std::move(instances), settings, std::move(effects)));
   if (progress) progress("laying the stroke", 0.0);
+  const bool placed = stroke.value.type != StrokeType::line || says("start") || says("end");
+  const SurfaceProjector project = bodiless ? drawn_as_it_is() : projector(scene);
   ASPERITY_TRY(StrokePath path,
-               at_place(build_stroke(stroke.value, bodiless ? drawn_as_it_is() : projector(scene)), "stroke"));
+               at_place(bodiless || placed ? build_stroke(stroke.value, project)
+                                           : lay_default_stroke(scene, probe.value, in_workspace(settings.view, bounds),
+                                                                project, stroke, context),
+                        "stroke"));
   for (const Instance& instance : scene.instances())
     note_rendering(instance, in_scene(scene.settings().view, path), stroke.value.speed / scene.settings().view.zoom,
                    probe.value.rate, context);

@@ -63,7 +63,32 @@ Result<FinePart> read_friction(ObjectReader& material, SceneContext& context, Ma
   return part;
 }
 
+namespace {
+
+/// Says which coefficients the contact law does not read. A proxy on the surface itself reads both.
+void note_unread_coefficients(const Instance& instance, SceneContext& context) {
+  const Material& material = instance.material;
+  const LawFacts& facts = instance.law.facts();
+  const bool shaped = instance.fine != nullptr && instance.fine->shapes_friction();
+  if (facts.proxy == LawProxy::surface || material.friction_named || shaped) return;
+  constexpr const char* named = "\"friction\" of the material names a law that is felt";
+  if (facts.retards) {
+    if (material.static_friction > material.dynamic_friction) {
+      context.note(
+          fmt::format("surface \"{}\": the law \"{}\" retards by the dynamic_friction of {:g} alone and does "
+                      "not read the static_friction of {:g} ({})",
+                      instance.name, facts.name, material.dynamic_friction, material.static_friction, named));
+    }
+  } else if (material.static_friction > 0.0 || material.dynamic_friction > 0.0) {
+    context.note(fmt::format("surface \"{}\": the law \"{}\" reads neither static_friction nor dynamic_friction ({})",
+                             instance.name, facts.name, named));
+  }
+}
+
+}  // namespace
+
 void note_friction(const Instance& instance, const FinePart& part, SceneContext& context) {
+  note_unread_coefficients(instance, context);
   const Material& material = instance.material;
   const FrictionLaw& law = material.friction;
   const bool asked_for = material.friction_named || part.lay_given || part.friction_map.factors != nullptr;

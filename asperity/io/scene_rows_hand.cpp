@@ -122,9 +122,10 @@ void stroke(SceneObject& row) {
       "raster: between rows; spiral: between windings; 0: from rows or turns. A share is of the object's largest side.",
       with_default(0.0), only_if(Test::is("type", {"raster", "spiral"}), by));
   row("start", place, "line: first end; raster: first corner." + shares, only_if(flat, by),
-      or_else("20 % into the top"), by_contents("a stroke without length"));
+      or_else("20 % into the top, or into another side where that meets too little"),
+      by_contents("a stroke without length"));
   row("end", place, "line: other end; raster: opposite corner." + shares, only_if(flat, by),
-      or_else("80 % into the top"));
+      or_else("80 % into the same side"));
   row("centre", place, "circle, spiral." + shares, only_if(round, by), or_else("the middle of the top"));
   row("radius", Type::length_or_share(positive),
       "circle; spiral: the outermost winding. A share is of the object's largest side.", only_if(round, by),

@@ -249,13 +249,16 @@ void volume(SceneObject& row) {
   of("radius", length(positive), "sphere: of the ball.", &S::radius, or_else("0.35 of the shortest side"));
   of("wavelength", length(positive), "shells, waves, gyroid, cavity: the distance of what repeats.", &S::wavelength);
   of("thickness", length(positive),
-     "shells: half thickness of the innermost sheet; cavity: half thickness of the shear layer.", &S::thickness,
-     by_contents("sheets that touch one another"));
+     "shells: half thickness of the innermost sheet; cavity: half thickness of the shear layer; waves: half width of "
+     "the steep strip along x.",
+     &S::thickness, by_contents("sheets that touch one another"));
   of("amplitude", length(not_negative), "waves: of the sheet.", &S::amplitude,
      only_if(Test::is("generator", {"waves"}), "by the generator \"{}\""), by_contents("more than the box holds"));
   of("amplitude", Type::number(not_negative), "ramp: in the field's unit.", &S::amplitude);
   of("gradient", Type::number(), "ramp: the field's slope in its unit by metre, not 0.", &S::gradient,
      by_contents("0"));
+  of("steepness", Type::number({1.0, 1e6}),
+     "waves: how many times steeper the field is in a strip along x, the sheet's place being the same.", &S::steepness);
   of("count", Type::integer(1, 64), "shells: how many sheets.", &S::count, by_contents("more sheets than fit"));
   of("speed", speed(positive), "cavity: of the outer stream.", &S::speed);
   of("strength", Type::number({0.0, 0.9}), "cavity: how far the layer has rolled up.", &S::strength);

@@ -37,4 +37,10 @@ const TriangleMesh& base_mesh(const Surface& surface) {
   return base_of(surface)->mesh();
 }
 
+std::size_t law_bytes(const Instance& instance) noexcept {
+  std::size_t bytes = instance.law.kind().state_bytes;
+  if (instance.dense != nullptr) bytes += sizeof(DenseMesh) + instance.dense->surface.index().memory_bytes();
+  return bytes;
+}
+
 }  // namespace asperity

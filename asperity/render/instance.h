@@ -97,6 +97,8 @@ struct Instance {
   std::shared_ptr<const DenseMesh> dense = nullptr;
 };
 
+/// What its law needs beside the surface: what was made for it, and what it remembers of one probe (bytes). [any]
+std::size_t law_bytes(const Instance& instance) noexcept;
 /// The sides that can be touched. [any]
 inline Sides sides_of(const Instance& instance) noexcept {
   return instance.sides.value_or(natural_sides(instance.surface));

@@ -134,7 +134,8 @@ struct LawKind {
   LawForce (*force)(const void* law, const TouchedSurface& surface, const Material& material, const Vec3& probe,
                     const Vec3& velocity, Seconds dt, LawMemory& memory) noexcept;
   void (*seen_from)(LawMemory& memory, const Vec3& previous) noexcept;
-  bool of_surface;  ///< what it remembers means something on another surface (State::of_surface)
+  bool of_surface;          ///< what it remembers means something on another surface (State::of_surface)
+  std::size_t state_bytes;  ///< of what it remembers; 0: nothing
 };
 
 namespace detail {
@@ -203,6 +204,7 @@ constexpr LawKind make_law_kind() {
       law_state<State>(memory).previous = previous;
     };
   if constexpr (requires { State::of_surface; }) kind.of_surface = State::of_surface;
+  if constexpr (requires { typename L::State; }) kind.state_bytes = sizeof(State);
   return kind;
 }
 

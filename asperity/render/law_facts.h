@@ -44,6 +44,7 @@ struct LawFacts {
   LawProxy proxy = LawProxy::none;
   LawCoat coat = LawCoat::nothing;
   bool linear = false;     ///< pushes by the material's stiffness times the penetration
+  bool retards = false;    ///< by the material's dynamic friction, where no friction law is named
   bool own_place = false;  ///< looks the material up itself, where its contact point is: it is given the instance's
   bool unpaid = false;     ///< built in: felt as its authors have it, what it gives is paid by nobody
   unsigned compared = 0;   ///< LawCompared

@@ -7,6 +7,7 @@
 
 #include "asperity/core/result.h"
 #include "asperity/core/trace_record.h"
+#include "asperity/device/stroke.h"
 #include "asperity/render/scene.h"
 
 namespace asperity {
@@ -34,27 +35,27 @@ double follow_error(const IsoView& surface, const Vec3& p) noexcept;
 /// to them, are left out. [any]
 FollowMetrics measure_follow(std::span<const double> errors, std::span<const Vec3> path);
 
-/// What is put through a layer to see who notices it.
+/// What is put through an isosurface to see who notices.
 struct DetectionSettings {
-  std::vector<double> thicknesses{0.05e-3, 0.2e-3};  ///< of the layer that M1 feels (m), each above 0
-  std::vector<double> speeds{0.2, 0.5};              ///< of the probe along the field's gradient (m/s), each above 0
-  double rate = 1400.0;                              ///< ticks a second (Hz), above 0
-  int passages = 500;                                ///< each with its own random start; 1 to 1,000,000
+  std::vector<double> speeds{0.2, 0.5};  ///< of the probe against the surface's normal (m/s), each above 0
+  double rate = 1400.0;                  ///< ticks a second (Hz), above 0
+  int passages = 500;                    ///< each at a random place of the stroke, from a random start; 1 to 1,000,000
   std::uint64_t seed = 1;
 };
 
-/// Shares of the passages in which a law answered with a contact at some tick.
+/// Shares of the passages at one speed in which a law answered with a contact at some tick.
 struct DetectionRow {
-  double thickness = 0.0;  ///< m
-  double speed = 0.0;      ///< m/s
-  double expected = 0.0;   ///< of M1: min(1, thickness / (speed / rate))
-  double avila = 0.0;
-  double cross_uncross = 0.0;
-  double proxy = 0.0;
+  double speed = 0.0;         ///< m/s
+  double layer = 0.0;         ///< how thick M1's layer is on the way (m, median of the places); without M1 not-a-number
+  double expected = 0.0;      ///< of M1: mean of min(1, layer / (speed / rate)); without M1 not-a-number
+  std::vector<double> share;  ///< one a scene; not-a-number where no passage could begin outside of what is touched
 };
 
-/// Drives a point probe straight through the isosurface of a linear field, with the consistent laws through `step`.
-/// One row for each thickness and speed, thicknesses outermost. Errors: bad_value naming the setting. [main]
-Result<std::vector<DetectionRow>> detection_table(const DetectionSettings& settings = {});
+/// Drives a point straight in through the isosurface that `felt` follow, at places of the stroke, with each scene's own
+/// law through `step`, until it is a tick's way beyond M1's layer: the one of the first scene that is felt by `avila`.
+/// The scenes differ in their laws alone. One row a speed; none without scenes, or without an isosurface in memory.
+/// Errors: bad_value naming the setting. [main]
+Result<std::vector<DetectionRow>> detection_table(std::span<const Scene> felt, const StrokePath& path,
+                                                  const DetectionSettings& settings = {});
 
 }  // namespace asperity

@@ -1,5 +1,6 @@
 #include "asperity/study/loop_rate.h"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 
@@ -90,17 +91,32 @@ double median_tick(const Scene& scene, const StrokePath& path, double rate, std:
 
 Result<std::vector<LoopRateRow>> loop_rates(const Scene& scene, const StrokePath& path, std::span<const Law> laws,
                                             double rate, std::uint64_t ticks) {
+  constexpr int rounds = 5;
   std::vector<LoopRateRow> rows;
+  std::vector<std::vector<Scene>> felt;
   for (const std::uint32_t stride : {8U, 4U, 2U, 1U}) {
     LoopRateRow row;
     std::vector<Instance> instances(scene.instances().begin(), scene.instances().end());
     if (!thin(instances, stride, row)) continue;
+    std::vector<Scene>& scenes = felt.emplace_back();
     for (const Law& law : laws) {
       for (Instance& instance : instances) instance.law = law;
-      ASPERITY_TRY(const Scene felt, Scene::build(instances, scene.settings()));
-      row.p50.push_back(median_tick(felt, path, rate, ticks));
+      ASPERITY_TRY(Scene made, Scene::build(instances, scene.settings()));
+      double bytes = 0.0;
+      for (const Instance& instance : made.instances()) bytes += static_cast<double>(law_bytes(instance));
+      row.law_bytes.push_back(bytes);
+      scenes.push_back(std::move(made));
     }
+    row.p50.assign(laws.size(), infinity);
     rows.push_back(std::move(row));
+  }
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t size = 0; size < rows.size(); ++size) {
+      for (std::size_t law = 0; law < laws.size(); ++law) {
+        double& least = rows[size].p50[law];
+        least = std::min(least, median_tick(felt[size][law], path, rate, ticks));
+      }
+    }
   }
   return rows;
 }

@@ -54,7 +54,7 @@ struct CompareReport {
   std::vector<CompareEntry> entries;
   std::optional<Picture> picture;
   std::vector<LoopRateRow> loop_rates;  ///< one p50 for each of `entries`; empty where no isosurface is touched
-  std::vector<DetectionRow> detection;  ///< who notices a thin layer; empty where no isosurface is touched
+  std::vector<DetectionRow> detection;  ///< one share for each of `entries`; empty where no isosurface is touched
 };
 
 /// One paragraph in plain words: how long, how strong, how true, how safe. For the page and the terminal. [main]

@@ -235,6 +235,53 @@ TEST_F(Program, CompareSetsLawsSideBySide) {
     EXPECT_TRUE(has(table.out, part)) << part;
 }
 
+/// Row M-3: who notices the isosurface is asked of the scene that is compared, its volume and its laws.
+TEST_F(Program, CompareDetectsOnTheSceneItself) {
+  const auto detection = [&](double gradient, double band) {
+    const json scene{{"surfaces",
+                      {{{"volume", {{"generator", "ramp"}, {"size", {9, 9, 9}}, {"gradient", gradient}}},
+                        {"iso", {{"threshold", 0.0}, {"inside", "low"}}},
+                        {"law", {{"type", "avila"}, {"band", band}}}}}},
+                     {"stroke", {{"start", {-0.01, 0, 0}}, {"end", {0.01, 0, 0}}, {"depth", "0.1 mm"}}}};
+    write("ramp.json", scene.dump());
+    const Call call = run("compare ramp.json --laws cross-uncross,avila --no-report --json --one-way");
+    EXPECT_EQ(call.code, 0) << call.err;
+    return json::parse(call.out)["detection"];
+  };
+  for (const auto& [gradient, band] : {std::pair(1000.0, 0.2), std::pair(1000.0, 0.4), std::pair(250.0, 0.2)}) {
+    const double layer = band / gradient;
+    const json rows = detection(gradient, band);
+    ASSERT_EQ(rows.size(), 8U);
+    for (const json& row : rows) {
+      const double law = std::min(1.0, layer * 1000.0 / row["speed"].get<double>());
+      EXPECT_NEAR(row["layer"].get<double>(), layer, 1e-3 * layer);
+      EXPECT_NEAR(row["expected"].get<double>(), law, 1e-3);
+      // Four standard deviations of a share of 300 passages.
+      EXPECT_NEAR(row["share"]["avila"].get<double>(), law, 4.0 * std::sqrt(law * (1.0 - law) / 300.0) + 1e-12) << row;
+      EXPECT_EQ(row["share"]["cross-uncross"], 1.0) << row;
+    }
+  }
+}
+
+/// Vorticity of a kitchen's air: from a fifth of its range on its surfaces lie on the volume's border.
+TEST_F(Program, TouchMeetsSurfacesOnTheBorderOfAVolume) {
+  const fs::path kitchen = fs::path(ASPERITY_SHARED_DATA) / "volumes" / "kitchen.vtk";
+  if (!fs::exists(kitchen)) GTEST_SKIP() << "shared data are not here";
+  for (const char* threshold : {"20 %", "30 %", "40 %", "50 %"}) {
+    SCOPED_TRACE(threshold);
+    const json scene{{"surfaces",
+                      {{{"volume", {{"file", kitchen.string()}, {"derive", "vorticity_magnitude"}}},
+                        {"iso", {{"threshold", threshold}, {"inside", "high"}}}}}}};
+    write("kitchen.json", scene.dump());
+    const Call call = run("touch kitchen.json --no-report --json --out kitchen");
+    ASSERT_EQ(call.code, 0) << call.err;
+    const json document = json::parse(call.out);
+    EXPECT_TRUE(document["warnings"].empty()) << document["warnings"];
+    const double contact = document["metrics"]["ticks"]["contact"].get<double>();
+    EXPECT_GT(contact, 0.25 * document["ticks"].get<double>());
+  }
+}
+
 TEST_F(Program, InspectKnowsEveryKindOfFile) {
   ASSERT_EQ(run("touch quick.json --no-report").code, 0);
   const auto kind = [&](const std::string& file) {

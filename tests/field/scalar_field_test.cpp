@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <set>
+#include <vector>
 
 #include "tests/field/volumes.h"
 
@@ -243,6 +245,74 @@ TEST(M_2_octree, splits_by_eight_then_four_then_two) {
     last.insert(splits[static_cast<std::size_t>(level)].begin(), splits[static_cast<std::size_t>(level)].end());
   }
   EXPECT_TRUE(last.count(4) == 1 && last.count(2) == 1);
+}
+
+/// Leaves of the octree that a threshold may cross, from the root down.
+std::set<std::array<std::uint32_t, 3>> crossed_from_root(const ScalarField& field, double threshold) {
+  const MinMaxOctree& tree = field.octree();
+  std::set<std::array<std::uint32_t, 3>> leaves;
+  std::vector<MinMaxOctree::Node> stack{tree.root()};
+  while (!stack.empty()) {
+    const MinMaxOctree::Node node = stack.back();
+    stack.pop_back();
+    if (!field.may_cross(0, node, threshold)) continue;
+    if (node.level == 0) leaves.insert({node.at[0], node.at[1], node.at[2]});
+    MinMaxOctree::Node children[8];
+    const int count = tree.children(node, children);
+    stack.insert(stack.end(), children, children + count);
+  }
+  return leaves;
+}
+
+/// Row M-2: the octree that is felt, on the paper's grid, against every cell of it. A cell whose corners lie on both
+/// sides of the threshold is passed by the field, whatever lies between them; a leaf is where its cells say.
+TEST(Rows, M2_OctreeThatIsFeltMissesNoCellOfThePapersGrid) {
+  const GridAxes axes{stretched_axis(-0.1, 0.1, 259, 0.6), stretched_axis(-0.05, 0.05, 127, 0.0),
+                      stretched_axis(-0.05, 0.05, 128, 0.8)};
+  // Gentle sheets, and samples that stand out of them alone.
+  std::mt19937_64 generator(4);
+  ScalarGrid grid = sampled(axes, [&](const Vec3& p) {
+    const double field = std::sin(60.0 * p.x()) * std::cos(90.0 * p.y()) + 0.5 * std::sin(120.0 * p.z());
+    return generator() % 5000 == 0 ? field + 3.0 : field;
+  });
+  for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
+    const ScalarField field(ScalarGrid(grid), reconstruction);
+    const MinMaxOctree& tree = field.octree();
+    const std::uint32_t wide = tree.leaf_cells();
+    // Of the leaves 65, 32 and 32 along the axes every node is halved wherever it has two: by eight, then by four and
+    // two.
+    EXPECT_EQ(tree.count(0, 0), (258 + wide - 1) / wide);
+    std::set<int> splits;
+    for (int level = tree.levels() - 1; level > 0; --level) {
+      for (std::uint32_t i = 0; i < tree.count(level, 0); ++i) {
+        MinMaxOctree::Node children[8];
+        splits.insert(tree.children({static_cast<std::uint8_t>(level), {i, i % tree.count(level, 1), 0}}, children));
+      }
+    }
+    EXPECT_TRUE(splits.count(8) == 1 && splits.count(2) == 1);
+    for (const double threshold : {0.01, 0.3, -1.2, 2.0}) {
+      std::set<std::array<std::uint32_t, 3>> passed;
+      for (std::uint32_t k = 0; k + 1 < axes[2].size(); ++k) {
+        for (std::uint32_t j = 0; j + 1 < axes[1].size(); ++j) {
+          for (std::uint32_t i = 0; i + 1 < axes[0].size(); ++i) {
+            const bool above = grid.value(i, j, k) > threshold;
+            bool both = false;
+            for (std::uint32_t corner = 1; corner < 8 && !both; ++corner)
+              both = (grid.value(i + (corner & 1U), j + (corner >> 1U & 1U), k + (corner >> 2U)) > threshold) != above;
+            if (both) passed.insert({i / wide, j / wide, k / wide});
+          }
+        }
+      }
+      const auto leaves = crossed_from_root(field, threshold);
+      EXPECT_GT(passed.size(), 100U);
+      EXPECT_TRUE(std::includes(leaves.begin(), leaves.end(), passed.begin(), passed.end())) << threshold;
+      // And it excludes what it is there to exclude: smooth cells look a sample farther, and overshoot.
+      if (reconstruction == CellReconstruction::trilinear) {
+        EXPECT_EQ(leaves, passed) << threshold;
+      }
+      EXPECT_LT(leaves.size(), std::size_t{65} * 32 * 32);
+    }
+  }
 }
 
 TEST_P(EachReconstruction, M_2_octree_excludes_no_cell_that_the_field_passes) {

@@ -161,6 +161,28 @@ TEST(VolumeGenerators, WavesUndulate) {
   EXPECT_NEAR(waves.value({0.01, 0.03, 0.05}), 0.0, 1e-12);
 }
 
+TEST(VolumeGenerators, SteepWavesStandWhereTheOthersDo) {
+  const VolumeFunction waves = *VolumeFunction::build(
+      {.kind = VolumeKind::waves, .wavelength = 0.02, .thickness = 0.01, .amplitude = 1e-4, .steepness = 400.0});
+  for (const double y : {0.0, 0.03, 0.05, 0.09}) {
+    EXPECT_NEAR(waves.value({0.005, y, 0.05 + 1e-4}), 0.0, 1e-12);
+    EXPECT_NEAR(waves.value({0.015, y, 0.05 - 1e-4}), 0.0, 1e-12);
+  }
+  // 1 mm over the middle: steepest in the strip's middle, 1 + 399 / e at its half width, plain far from it.
+  EXPECT_NEAR(waves.value({0.01, 0.05, 0.051}), 0.4, 1e-12);
+  EXPECT_NEAR(waves.value({0.01, 0.04, 0.051}), 1e-3 * (1.0 + 399.0 / std::numbers::e), 1e-9);
+  EXPECT_NEAR(waves.value({0.01, 0.0, 0.051}), 1e-3, 1e-11);
+  // Rows of a grid differ along y.
+  VolumeGenerator generator = small(VolumeKind::waves);
+  generator.steepness = 400.0;
+  const ScalarGrid grid = scalars(generator);
+  const VolumeFunction function = *VolumeFunction::build(generator);
+  for (std::uint32_t j = 0; j < grid.axis(1).size(); ++j) {
+    const Vec3 p(grid.axis(0).node(2), grid.axis(1).node(j), grid.axis(2).node(1));
+    EXPECT_EQ(grid.value(2, j, 1), static_cast<double>(static_cast<float>(function.value(p)))) << j;
+  }
+}
+
 TEST(VolumeGenerators, SlabsAreTheVolumeInPieces) {
   for (const VolumeKind kind : {VolumeKind::sphere, VolumeKind::shells, VolumeKind::waves, VolumeKind::gyroid}) {
     const VolumeGenerator generator = small(kind);
@@ -221,6 +243,8 @@ TEST(VolumeGenerators, RefusesWhatCannotBe) {
   EXPECT_EQ(refusal({.kind = VolumeKind::ramp, .gradient = 0.0}), "gradient");
   EXPECT_EQ(refusal({.kind = VolumeKind::ramp, .amplitude = -1.0}), "amplitude");
   EXPECT_EQ(refusal({.kind = VolumeKind::waves, .amplitude = nan}), "amplitude");
+  EXPECT_EQ(refusal({.kind = VolumeKind::waves, .thickness = 0.0}), "thickness");
+  EXPECT_EQ(refusal({.kind = VolumeKind::waves, .steepness = 0.5}), "steepness");
   EXPECT_EQ(refusal({.kind = VolumeKind::gyroid, .wavelength = infinity}), "wavelength");
   EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .speed = 0.0}), "speed");
   EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .strength = 1.0}), "strength");

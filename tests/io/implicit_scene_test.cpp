@@ -2,6 +2,7 @@
 
 #include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/io/sparse_io.h"
+#include "asperity/render/law_registry.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/io/experiment_fixture.h"
 
@@ -203,6 +204,57 @@ TEST_F(ImplicitScene, WrongKeysAreNamed) {
         << refused.scene << ": " << error.message();
     EXPECT_FALSE(error.accepted.empty()) << refused.scene;
   }
+}
+
+/// Every law, on surfaces of every kind that it can be felt on: told that a coefficient is not read where, and only
+/// where, it changes no force.
+TEST_F(ImplicitScene, CoefficientsThatALawDoesNotReadAreTold) {
+  const std::string surfaces[] = {R"("mesh":"sphere.ply","fit":"10cm")",
+                                  R"("mesh":"sheet.obj","fit":"10cm","coat":{"height_map":"map.png","height":"1mm"})",
+                                  R"("volume":{"generator":"sphere","size":[24,24,24]},"iso":{"threshold":0})",
+                                  R"("mesh":{"generator":"box","size":[0.04,0.04,0.04]},"implicit":{"resolution":20})"};
+  int neither = 0;
+  int static_alone = 0;
+  int both = 0;
+  for (const std::string& surface : surfaces) {
+    for (const std::string& law : law_names()) {
+      SCOPED_TRACE(law + " on " + surface);
+      const auto with = [&](const char* material) {
+        return parse(R"({"surfaces":[{)" + surface + R"(,"law":")" + law + R"(","material":)" + material + "}]}");
+      };
+      const auto smooth = with("{}");
+      if (!smooth) continue;
+      const auto rough = with(R"({"static_friction":0.4,"dynamic_friction":0.2})").value();
+      const auto sliding = with(R"({"static_friction":0.2,"dynamic_friction":0.2})").value();
+      const auto hash = [](const Experiment& e) { return short_run(e, 1200); };
+      const bool reads_any = hash(sliding) != hash(*smooth);
+      EXPECT_EQ(noted(rough, "reads neither static_friction nor dynamic_friction"), !reads_any);
+      EXPECT_EQ(noted(sliding, "reads neither static_friction nor dynamic_friction"), !reads_any);
+      EXPECT_FALSE(noted(*smooth, "friction"));
+      const bool told = noted(rough, "does not read the static_friction");
+      if (told) {
+        EXPECT_EQ(hash(rough), hash(sliding));
+      }
+      EXPECT_FALSE(noted(sliding, "does not read the static_friction"));
+      neither += reads_any ? 0 : 1;
+      static_alone += told ? 1 : 0;
+      both += reads_any && !told ? 1 : 0;
+      // Where a friction law is named every law feels it, and nothing is said.
+      const auto named =
+          with(R"({"static_friction":0.4,"dynamic_friction":0.2,"friction":"implicit-coulomb"})").value();
+      // (As printed some push nothing out here: there is nothing to rub by.)
+      if (!law.ends_with("-literal")) {
+        EXPECT_NE(hash(named), hash(*smooth));
+      }
+      EXPECT_FALSE(noted(named, "reads neither"));
+      EXPECT_FALSE(noted(named, "does not read"));
+    }
+  }
+  // avila and cross-uncross, and the laws of meshes without a proxy on the surface; virtual contact points and magnets;
+  // the proxy.
+  EXPECT_GE(neither, 8);
+  EXPECT_GE(static_alone, 4);
+  EXPECT_GE(both, 4);
 }
 
 TEST_F(ImplicitScene, LawsAndSurfacesThatDoNotGoTogetherAreNamed) {

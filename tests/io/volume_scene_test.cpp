@@ -70,6 +70,57 @@ TEST_F(VolumeScene, AVolumeIsFittedToTheWorkspaceAndSaysSo) {
   EXPECT_DOUBLE_EQ(surface.threshold(), otsu_threshold(*surface.field().grid()));
 }
 
+// A ball whose top the volume cuts off: over the top the stroke would come in through the volume's border, behind the
+// rim, where nobody knows inside from outside.
+TEST_F(VolumeScene, AStrokeThatNobodyHasPlacedMeetsWhatIsThere) {
+  std::vector<float> cut;
+  for (int k = 0; k < 7; ++k) {
+    for (int j = 0; j < 7; ++j) {
+      for (int i = 0; i < 9; ++i)
+        cut.push_back(static_cast<float>(1.5 - (Vec3(0.75 * i, 0.75 * j, 0.75 * k) - Vec3(3.0, 4.0, 2.25)).norm()));
+    }
+  }
+  write_raw("cut.raw", cut);
+  write("cut.json", sidecar("cut.raw", 1));
+  const auto contact = [](const Experiment& e) {
+    IdealProbe probe = IdealProbe::build(e.path, e.ideal).value();
+    ProxyState state;
+    ProxyCache cache;
+    int all = 0;
+    int touched = 0;
+    const Seconds dt(1.0 / e.rate);
+    while (!probe.finished()) {
+      const ProbeSample sample = probe.read();
+      const ForceSample force = step(e.scene, state, cache, sample, dt);
+      if (e.path.pose(sample.time).phase == StrokePhase::contact) {
+        ++all;
+        touched += force.flags.has(TickFlag::contact) ? 1 : 0;
+      }
+      probe.apply(force.wrench.force, dt);
+    }
+    return static_cast<double>(touched) / all;
+  };
+  const std::string surface = R"("volume":"cut.json","iso":{"threshold":0,"inside":"high"})";
+  const Experiment top =
+      good(R"({"surfaces":[{)" + surface + R"(}],"stroke":{"start":["30%","100%","50%"],"end":["70%","100%","50%"]}})");
+  EXPECT_LT(contact(top), 0.25);
+  EXPECT_FALSE(has_note(top, "stroke:"));
+  for (const auto& [law, stroke] : {std::pair("proxy", "{}"), std::pair("cross-uncross", R"({"normal_force":0.5})"),
+                                    std::pair("avila", R"({"normal_force":0.5})")}) {
+    SCOPED_TRACE(law);
+    const Experiment e = good(R"({"surfaces":[{)" + surface + R"(,"law":")" + law + R"("}],"stroke":)" + stroke + "}");
+    EXPECT_GT(contact(e), 0.9);
+    EXPECT_TRUE(has_note(e, "stroke: where it is laid by default"));
+    const Experiment again = good(e.canonical_json);
+    EXPECT_EQ(again.canonical_json, e.canonical_json);
+    EXPECT_EQ(again.stroke.start, e.stroke.start);
+  }
+  // Whole, it is met over the top, and nothing is said.
+  const Experiment whole = good(R"({"surfaces":[{"volume":"ball.json","iso":{"threshold":0}}]})");
+  EXPECT_FALSE(has_note(whole, "stroke:"));
+  EXPECT_GT(contact(whole), 0.9);
+}
+
 TEST_F(VolumeScene, UnitsFitAndPoseAreThoseOfMeshes) {
   const Experiment mm = good(R"({"surfaces":[{"volume":"ball.json","units":"mm","iso":{"threshold":0}}]})");
   EXPECT_NEAR(iso(mm).field().bounds().upper.x(), 0.006, 1e-15);

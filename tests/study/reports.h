@@ -71,8 +71,9 @@ inline CompareReport volume_report(const std::string& title) {
   const StrokePath path = line_path();
   CompareReport report;
   report.origin = origin(title);
+  std::vector<Scene> scenes;
   for (const char* name : {"avila", "cross-uncross", "proxy"}) {
-    const Scene scene = volume_scene(law_by_name(name).value());
+    const Scene& scene = scenes.emplace_back(volume_scene(law_by_name(name).value()));
     const auto records = rendered_along(path, scene);
     CompareEntry entry;
     entry.law = name;
@@ -82,7 +83,7 @@ inline CompareReport volume_report(const std::string& title) {
   }
   DetectionSettings settings;
   settings.passages = 50;
-  report.detection = detection_table(settings).value();
+  report.detection = detection_table(scenes, path, settings).value();
   return report;
 }
 

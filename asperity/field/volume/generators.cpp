@@ -26,7 +26,7 @@ constexpr std::array<VolumeEntry, 6> volume_table{{
     {VolumeKind::sphere, {"radius"}},
     {VolumeKind::shells, {"count", "thickness", "wavelength"}},
     {VolumeKind::ramp, {"gradient", "amplitude"}},
-    {VolumeKind::waves, {"amplitude", "wavelength"}},
+    {VolumeKind::waves, {"amplitude", "wavelength", "steepness", "thickness"}},
     {VolumeKind::gyroid, {"wavelength"}},
 }};
 
@@ -122,6 +122,8 @@ Status check_kind(const VolumeGenerator& g) {
       return within(*g.amplitude, 0.0, 1e30, "amplitude");
     case VolumeKind::waves:
       ASPERITY_CHECK(above_zero(*g.wavelength, "wavelength", "m"));
+      ASPERITY_CHECK(above_zero(*g.thickness, "thickness", "m"));
+      ASPERITY_CHECK(within(g.steepness, 1.0, 1e6, "steepness"));
       return within(*g.amplitude, 0.0, 1e30, "amplitude");
     case VolumeKind::gyroid: return above_zero(*g.wavelength, "wavelength", "m");
   }
@@ -161,7 +163,11 @@ VolumeGenerator completed(VolumeGenerator g) {
     }
   }
   if (!g.thickness) {
-    g.thickness = cavity ? 0.03 * g.extent->z() : *g.wavelength * std::min(0.02, 0.25 / std::max(g.count, 1));
+    switch (g.kind) {
+      case VolumeKind::cavity: g.thickness = 0.03 * g.extent->z(); break;
+      case VolumeKind::waves: g.thickness = 0.1 * g.extent->y(); break;
+      default: g.thickness = *g.wavelength * std::min(0.02, 0.25 / std::max(g.count, 1)); break;
+    }
   }
   if (!g.amplitude) g.amplitude = g.kind == VolumeKind::waves ? 0.0005 * g.extent->z() : 0.0;
   return g;
@@ -257,7 +263,11 @@ double VolumeFunction::value(const Vec3& p) const noexcept {
       const double linear = g.gradient * (p.z() - centre_.z());
       return *g.amplitude > 0.0 ? *g.amplitude * std::tanh(linear / *g.amplitude) : linear;
     }
-    case VolumeKind::waves: return p.z() - centre_.z() - *g.amplitude * std::sin(whole_turn * p.x() / *g.wavelength);
+    case VolumeKind::waves: {
+      const double height = p.z() - centre_.z() - *g.amplitude * std::sin(whole_turn * p.x() / *g.wavelength);
+      const double across = (p.y() - centre_.y()) / *g.thickness;
+      return height * (1.0 + (g.steepness - 1.0) * std::exp(-across * across));
+    }
     case VolumeKind::gyroid: {
       const Vec3 a = p * (whole_turn / *g.wavelength);
       return std::sin(a.x()) * std::cos(a.y()) + std::sin(a.y()) * std::cos(a.z()) + std::sin(a.z()) * std::cos(a.x());
@@ -308,7 +318,8 @@ void VolumeFunction::slab(const GridAxes& axes, std::uint32_t first, std::uint32
   for (std::uint32_t k = first; k < last; ++k) {
     const float* rows = to;
     for (std::uint32_t j = 0; j < axes[1].size(); ++j, to += axes[0].size()) {
-      const bool same = j > 0 && (generator_.kind == VolumeKind::waves || generator_.kind == VolumeKind::ramp);
+      const bool even = generator_.kind == VolumeKind::waves && generator_.steepness == 1.0;
+      const bool same = j > 0 && (even || generator_.kind == VolumeKind::ramp);
       if (same) {
         std::copy_n(rows, axes[0].size(), to);
       } else {

@@ -28,7 +28,9 @@ enum class VolumeKind : std::uint8_t {
   /// A layer across z: 0 at the middle height and `gradient` (unit/m) there; with an `amplitude` it levels off at
   /// plus and minus that (tanh), without one the field is linear throughout.
   ramp,
-  /// z - middle - `amplitude` sin(2 pi x / wavelength) (m): a weakly undulating sheet at threshold 0.
+  /// s(y) (z - middle - `amplitude` sin(2 pi x / wavelength)) (m): a weakly undulating sheet at threshold 0, in a field
+  /// whose slope s is 1, and up to `steepness` in a strip along x: s = 1 + (steepness - 1) exp(-((y - middle) /
+  /// thickness)^2). The place of the sheet does not depend on s.
   waves,
   /// sin X cos Y + sin Y cos Z + sin Z cos X, X = 2 pi x / wavelength: the gyroid at threshold 0.
   gyroid,
@@ -62,11 +64,13 @@ struct VolumeGenerator {
   /// the distance of the vortices, a fifth of x.
   std::optional<double> wavelength = std::nullopt;
   /// m, above 0. `shells`: half thickness of the innermost sheet, at most wavelength / (4 count); own: 0.02 wavelength,
-  /// or what fits. `cavity`: half thickness of the shear layer; own: 0.03 of z.
+  /// or what fits. `cavity`: half thickness of the shear layer; own: 0.03 of z. `waves`: half width of the steep strip;
+  /// own: 0.1 of y.
   std::optional<double> thickness = std::nullopt;
   /// 0 or more. `waves`: m, own: 0.0005 of z; `ramp`: the field's unit, own: 0.
   std::optional<double> amplitude = std::nullopt;
   double gradient = 100.0;                ///< `ramp`: unit/m, not 0
+  double steepness = 1.0;                 ///< `waves`: greatest slope over least, 1 to 1e6
   int count = 4;                          ///< `shells`: sheets, 1 to 64
   double speed = 10.0;                    ///< `cavity`: of the outer stream (m/s), above 0
   double strength = 0.35;                 ///< `cavity`: how far the layer has rolled up, 0 (straight) to 0.9

@@ -155,5 +155,11 @@ Status read_change(ObjectReader& root, SceneSettings& settings);
 /// `bounds`: of the base meshes (m, world), for defaults and percentages. [build]
 Result<ScenePart<StrokeSettings>> read_stroke(const SceneJson* json, const std::string& place, const Box& bounds,
                                               const SceneContext& context);
+/// A stroke whose place the scene does not say: as the default has it where that is in contact for a quarter of its
+/// way, else over whichever side of the bounds it touches most of; with a note. `stroke` becomes what is laid. Errors:
+/// those of build_stroke, of the default. [build]
+Result<StrokePath> lay_default_stroke(const Scene& scene, const ProbeSettings& probe, const Box& bounds,
+                                      const SurfaceProjector& project, ScenePart<StrokeSettings>& stroke,
+                                      SceneContext& context);
 
 }  // namespace asperity

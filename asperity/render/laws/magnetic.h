@@ -15,6 +15,7 @@ struct MagneticLaw {
                                   .source = "hybrid-surface-2004, Fig. 6b",
                                   .needs = LawNeeds::potential,
                                   .linear = true,
+                                  .retards = true,
                                   .own_place = true};
   Formulation formulation = Formulation::consistent;
   double band = 0.002;  ///< m, above 0

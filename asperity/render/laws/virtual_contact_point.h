@@ -22,6 +22,7 @@ struct VirtualContactPointLaw {
                                   .source = "hybrid-surface-2004, eq. 1 and 2",
                                   .needs = LawNeeds::potential,
                                   .linear = true,
+                                  .retards = true,
                                   .own_place = true,
                                   .compared = on_implicit | literal_too};
   Formulation formulation = Formulation::consistent;

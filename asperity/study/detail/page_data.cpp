@@ -213,20 +213,22 @@ json law_data(const std::string& law, const RunSeries& s, const RunMetrics& m, s
                                               per_millimetre(m.spectrum.tangential_distance))}};
 }
 
-/// Rows [layer in mm, speed in m/s, expected of M1, M1, M2, proxy], shares.
+/// Rows [speed in m/s, layer in mm, expected of M1, share of each law ...].
 json detection_data(const std::vector<DetectionRow>& rows) {
   json data = json::array();
-  for (const DetectionRow& row : rows)
-    data.push_back({significant(row.thickness * milli), significant(row.speed), significant(row.expected),
-                    significant(row.avila), significant(row.cross_uncross), significant(row.proxy)});
+  for (const DetectionRow& row : rows) {
+    json entry{significant(row.speed), significant(row.layer * milli), significant(row.expected)};
+    for (const double share : row.share) entry.push_back(significant(share));
+    data.push_back(std::move(entry));
+  }
   return data;
 }
 
-/// Rows [samples, MB, microseconds a tick of each law ...].
+/// Rows [samples, MB of the volume, [bytes more of each law], microseconds a tick of each law ...].
 json loop_rate_data(const std::vector<LoopRateRow>& rows) {
   json data = json::array();
   for (const LoopRateRow& row : rows) {
-    json entry{row.samples, significant(row.bytes * 1e-6)};
+    json entry{row.samples, significant(row.bytes * 1e-6), row.law_bytes};
     for (const double p50 : row.p50) entry.push_back(significant(p50 * 1e6));
     data.push_back(std::move(entry));
   }
