@@ -108,7 +108,8 @@ Result<bool> change(Instance& instance, const std::string& word) {
   if (stem == "lay") {
     return change_fine(instance, [as](FineSettings& fine) {
       fine.lay.formulation = as;
-      return fine.lay.still_ratio < 1.0 || fine.lay.sliding_ratio < 1.0 || !fine.micro.empty();
+      return fine.lay.still_ratio < 1.0 || fine.lay.sliding_ratio < 1.0 || fine.lay.stiffness_ratio < 1.0 ||
+             !fine.micro.empty();
     });
   }
   ASPERITY_TRY(const FrictionKind kind, friction_by_name(stem));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "asperity/io/detail/scene_fine.h"
 
@@ -76,8 +77,11 @@ std::array<Vec2, 3> corners_of(const TriangleMesh& mesh, const FeatureMapping& m
     corners[k] = places[0].uv;
     on_axis[k] = places[0].du.isZero(0.0);
   }
-  const double around = mapping.circumference();
-  if (around == 0.0) return corners;
+  const bool round =
+      settings.surface == IntermediateSurface::cylinder || settings.surface == IntermediateSurface::sphere;
+  if (!round) return corners;
+  // Over the seam of a range, too: a face that it crosses goes on with one side's pattern.
+  const double around = 2.0 * std::numbers::pi * settings.radius;
   const std::size_t first = on_axis[0] ? (on_axis[1] ? 2 : 1) : 0;
   double mean = 0.0;
   int counted = 0;

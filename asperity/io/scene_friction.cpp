@@ -23,6 +23,7 @@ void read_lay(const SceneJson& json, ObjectReader& material, FrictionLay& lay) {
   ObjectReader reader(json, material.place_of("lay"), "lay");
   reader.read("still_ratio", lay.still_ratio);
   lay.sliding_ratio = reader.get("sliding_ratio", lay.still_ratio);
+  reader.read("stiffness_ratio", lay.stiffness_ratio);
   reader.read("formulation", lay.formulation);
   lay.direction = reader.find<double>("direction");
   material.take("lay", std::move(reader));
@@ -110,6 +111,11 @@ void note_friction(const Instance& instance, const FinePart& part, SceneContext&
                              viscous        ? "friction.viscosity"
                              : slides_alone ? "dynamic_friction"
                                             : "static_friction"));
+  }
+  if (part.lay.stiffness_ratio < 1.0 && (viscous || law.kind == FrictionKind::coulomb)) {
+    context.note(fmt::format(
+        "surface \"{}\": the friction law \"{}\" does not read the stiffness_ratio of the lay: it has no spring",
+        instance.name, friction_name(law.kind)));
   }
   if (!material.friction_named) return;
   if (viscous && material.static_friction > 0.0) {

@@ -101,9 +101,12 @@ void lay(SceneObject& row) {
   row("still_ratio", ratio({0.0, 1.0}), "Static coefficient along the lay over that across it.", &S::still_ratio);
   row("sliding_ratio", ratio({0.0, 1.0}), "The same of the dynamic coefficient.", &S::sliding_ratio,
       or_else("still_ratio"));
+  row("stiffness_ratio", ratio({0.01, 1.0}), "The same of the stiffness of the friction law's spring (k_s of eq. 13).",
+      &S::stiffness_ratio);
   row("formulation", Type::named<Formulation>(),
-      "literal: a coefficient by the angle between velocity and gradient (eq. 15). consistent: an ellipse, force of "
-      "maximum dissipation.",
+      "literal: coefficients and stiffness by the angle between velocity and gradient (eq. 15). consistent: an "
+      "ellipse, "
+      "force of maximum dissipation, and a spring of two stiffnesses.",
       &S::formulation);
   row("direction", angle(), "Across the lay, from u towards v.", &S::direction, or_else("that of the features"));
 }
@@ -222,6 +225,11 @@ void feature_mapping(SceneObject& row) {
      framed, or_else("x, or y where the axis is x"), by_contents("a direction along the axis"));
   of("radius", length(positive), "Where u is measured in metres.", {"cylinder", "sphere"},
      or_else("half of the surface's size across the axis"), by_contents(unnamed));
+  of("range", Type::array(angle(), 2, 2, "angles").saying("two angles [from, to]"),
+     "Angles around the axis that features are wrapped over (eq. 6), u counting from the first. They go on beyond both "
+     "up to a seam opposite their middle, where they need not close: they are felt as a step there.",
+     {"cylinder", "sphere"}, or_else("all around: features have to close"),
+     by_contents("a second angle that is not above the first, or more than a turn"));
   of("half_extent", Type::vector(Dimension::length), "Along reference, axis x reference and axis.", {"box"},
      or_else("half of the surface's size"), by_contents("what is no box; " + unnamed));
   of("tile", Type::pair(length(positive)), "Length of one unit of u and v.", {"uv"},

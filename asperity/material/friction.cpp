@@ -19,17 +19,16 @@ namespace {
 /// would push along the motion, so there is none.
 Vec3 drag(const FrictionLaw& law, const TangentContact& c) noexcept {
   if (law.viscosity <= 0.0) return Vec3::Zero();
-  if (law.formulation == Formulation::consistent && c.velocity.dot(c.motion) < 0.0) return Vec3::Zero();
-  return -law.viscosity * c.velocity;
+  if (law.formulation == Formulation::consistent && c.drift.dot(c.motion) < 0.0) return Vec3::Zero();
+  return -law.viscosity * c.drift;
 }
 
 Vec3 coulomb(const FrictionLaw& law, const TangentContact& c) noexcept {
   Vec3 force = c.against(c.velocity, c.sliding);
   if (law.formulation == Formulation::consistent) {
-    const double speed = c.velocity.norm();
-    if (speed < law.stick_speed) force *= speed / law.stick_speed;
+    if (c.speed < law.stick_speed) force *= c.speed / law.stick_speed;
   }
-  return force - law.viscosity * c.velocity;
+  return force - law.viscosity * c.drift;
 }
 
 // Kikuuwe et al. 2006: the spring's stretch after the tick solves K z + B (z - z0) / dt = -f with f on the ellipse;
@@ -50,7 +49,7 @@ Vec3 implicit_coulomb(const FrictionLaw& law, const TangentContact& c, FrictionS
 }
 
 Vec3 karnopp_literal(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
-  const bool fast = c.velocity.norm() >= law.stick_speed;
+  const bool fast = c.speed >= law.stick_speed;
   // It comes to stick where it is now: the anchor jumps there, and the force with it.
   Vec3 stretched = state.sliding ? Vec3::Zero() : Vec3(state.stretch + c.motion);
   const Vec3 pull = c.stiffness * stretched;
@@ -88,7 +87,7 @@ double share_within(const TangentContact& c, const Vec3& from, const Vec3& step,
 // limit; the first alone would never let a slow drag stick, the speed alone would stick at the tick after the break.
 Vec3 karnopp(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
   if (law.formulation == Formulation::literal) return karnopp_literal(law, c, state);
-  const bool slow = c.velocity.norm() < law.stick_speed;
+  const bool slow = c.speed < law.stick_speed;
   const Vec3 pull = c.stiffness * (state.stretch + c.motion);
   if (state.sliding && slow && (state.fast || c.within(pull, c.sliding))) state.sliding = false;
   if (!state.sliding) {
@@ -239,7 +238,7 @@ Vec3 passive_bristle_damping(const TangentContact& c, const Limits& cone, const 
 // Canudas de Wit et al. 1995; along two axes as Velenis et al. 2005.
 Vec3 lugre(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
   const double slow = law.stribeck_speed;
-  const double stribeck = std::exp(-c.velocity.squaredNorm() / (slow * slow));
+  const double stribeck = std::exp(-c.speed * c.speed / (slow * slow));
   const auto between = [stribeck](double low, double high) noexcept { return low + (high - low) * stribeck; };
   const Limits level{between(c.sliding.across, c.still.across), between(c.sliding.lay, c.still.lay)};
   const Limits axes = stretch_limits(level, c.stiffness);
@@ -266,7 +265,7 @@ bool has_spring(FrictionKind kind) noexcept {
 Vec3 force_of(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
   switch (law.kind) {
     case FrictionKind::implicit_coulomb: return implicit_coulomb(law, c, state);
-    case FrictionKind::viscous: return -law.viscosity * c.velocity;
+    case FrictionKind::viscous: return -law.viscosity * c.drift;
     case FrictionKind::coulomb: return coulomb(law, c);
     case FrictionKind::karnopp: return karnopp(law, c, state);
     case FrictionKind::dahl: return dahl(law, c, state);
@@ -276,9 +275,14 @@ Vec3 force_of(const FrictionLaw& law, const TangentContact& c, FrictionState& st
   return Vec3::Zero();
 }
 
+/// The printed stiffness changes with the direction, and the stretch stays (eq. 13 with eq. 15).
+bool stiff_by_angle(const FrictionCoefficients& coefficients) noexcept {
+  return coefficients.stiffness_ratio != 1.0 && coefficients.formulation == Formulation::literal;
+}
+
 /// A law or a stiffness that was changed while touching. The spring may not gain: a stiffer one goes on with its force,
-/// a softer one with its energy.
-void take_over(const FrictionLaw& law, double own, FrictionState& state) noexcept {
+/// a softer one with its energy. `printed`: it may.
+void take_over(const FrictionLaw& law, double own, bool printed, FrictionState& state) noexcept {
   const double stiffness = !has_spring(law.kind) ? 0.0 : law.stiffness > 0.0 ? law.stiffness : own;
   if (state.kind != law.kind) {
     state.kind = law.kind;
@@ -287,7 +291,7 @@ void take_over(const FrictionLaw& law, double own, FrictionState& state) noexcep
   if (stiffness == state.stiffness) return;
   if (stiffness == 0.0) {
     state.stretch.setZero();
-  } else if (state.stiffness > 0.0) {
+  } else if (state.stiffness > 0.0 && !printed) {
     const double ratio = state.stiffness / stiffness;
     state.stretch *= ratio < 1.0 ? ratio : std::sqrt(ratio);
   }
@@ -301,18 +305,20 @@ Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, Fric
   if (first) state = FrictionState{};
   state.held = true;
   state.stretch -= contact.normal.dot(state.stretch) * contact.normal;
-  take_over(law, contact.stiffness, state);
+  const bool by_angle = stiff_by_angle(contact.coefficients);
+  take_over(law, contact.stiffness, by_angle, state);
   TangentContact tangent = tangent_contact(law, contact, state.stretch);
+  if (by_angle && state.stiffness > 0.0) state.stiffness = tangent.stiffness;
   if (first && has_spring(law.kind)) {
     // Where the motion began is not known to have been on the surface.
     if (law.kind == FrictionKind::karnopp) {
-      state.fast = tangent.velocity.norm() >= law.stick_speed;
+      state.fast = tangent.speed >= law.stick_speed;
       state.sliding = state.fast;
     }
     if (law.kind != FrictionKind::karnopp || law.formulation == Formulation::consistent) return Vec3::Zero();
     tangent.motion.setZero();
   }
-  const Vec3 force = force_of(law, tangent, state);
+  const Vec3 force = tangent.felt(force_of(law, tangent, state));
   if (std::isfinite(force.squaredNorm() + state.stretch.squaredNorm())) return force;
   state = FrictionState{};
   return Vec3::Zero();
@@ -320,6 +326,16 @@ Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, Fric
 
 double friction_energy(const FrictionState& state) noexcept {
   return 0.5 * state.stiffness * state.stretch.squaredNorm();
+}
+
+Vec3 friction_spring(const FrictionContact& contact, const FrictionState& state) noexcept {
+  const FrictionCoefficients& coefficients = contact.coefficients;
+  const Vec3 pull = -state.stiffness * state.stretch;
+  if (coefficients.stiffness_ratio == 1.0 || stiff_by_angle(coefficients)) return pull;
+  const Vec3 lay = contact.normal.cross(coefficients.across);
+  const double square = lay.squaredNorm();
+  if (!(square > no_lay * no_lay)) return pull;
+  return pull - ((1.0 - std::sqrt(coefficients.stiffness_ratio)) * pull.dot(lay) / square) * lay;
 }
 
 }  // namespace asperity

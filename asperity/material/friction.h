@@ -75,13 +75,15 @@ Status validate(const FrictionLaw& law);
 
 /// Coefficients of one contact, and how they depend on the direction.
 struct FrictionCoefficients {
-  double still = 0.0;          ///< static coefficient across the lay, where it is largest; not below `sliding`
-  double sliding = 0.0;        ///< dynamic coefficient across the lay
-  double still_ratio = 1.0;    ///< along the lay over across it, 0 to 1; 1: the same in every direction
-  double sliding_ratio = 1.0;  ///< likewise
-  Vec3 across = Vec3::Zero();  ///< unit, in the tangent plane: along the gradient of the features; zero: isotropic
-  /// literal: a coefficient interpolated by the angle between velocity and gradient, force against the velocity
-  /// (heterogeneous-features-2008, eq. 15); consistent: an ellipse, force of maximum dissipation.
+  double still = 0.0;            ///< static coefficient across the lay, where it is largest; not below `sliding`
+  double sliding = 0.0;          ///< dynamic coefficient across the lay
+  double still_ratio = 1.0;      ///< along the lay over across it, 0 to 1; 1: the same in every direction
+  double sliding_ratio = 1.0;    ///< likewise
+  double stiffness_ratio = 1.0;  ///< stiffness of the law's spring along the lay over across it, above 0 to 1
+  Vec3 across = Vec3::Zero();    ///< unit, in the tangent plane: along the gradient of the features; zero: isotropic
+  /// literal: coefficients and stiffness interpolated by the angle between velocity and gradient, force against the
+  /// velocity (heterogeneous-features-2008, eq. 15), which feeds energy where a stretched spring turns stiffer;
+  /// consistent: an ellipse, force of maximum dissipation, and a spring of two stiffnesses.
   Formulation formulation = Formulation::consistent;
 };
 
@@ -98,8 +100,10 @@ struct FrictionContact {
 
 /// What a contact remembers between ticks. `FrictionState{}` is one that has just been made.
 struct FrictionState {
-  Vec3 stretch = Vec3::Zero();  ///< of the spring: from its anchor to the probe (m), in the tangent plane
-  double stiffness = 0.0;       ///< of the spring that holds it (N/m); 0: not stretched yet
+  /// Of the spring: from its anchor to the probe (m), in the tangent plane. Of two stiffnesses (consistent): along the
+  /// lay as long as what holds as much energy across it, so that a lay that turns gives none.
+  Vec3 stretch = Vec3::Zero();
+  double stiffness = 0.0;  ///< of the spring that holds it (N/m), across the lay; 0: not stretched yet
   FrictionKind kind = FrictionKind::implicit_coulomb;  ///< that the rest belongs to
   bool sliding = false;                                ///< the last tick slid
   bool fast = false;                                   ///< karnopp: has been as fast as stick_speed since it broke away
@@ -113,6 +117,9 @@ struct FrictionState {
 Vec3 friction_force(const FrictionLaw& law, const FrictionContact& contact, FrictionState& state) noexcept;
 /// Energy held in the tangential spring (J). [servo]
 double friction_energy(const FrictionState& state) noexcept;
+/// The part of the force of a law with a spring that its spring pulls with (N), after the same contact was answered.
+/// [servo]
+Vec3 friction_spring(const FrictionContact& contact, const FrictionState& state) noexcept;
 
 /// The point of an ellipse's disc that is nearest to `pull`, in the tangent plane: `across` unit, the half-axis along
 /// it, and the half-axis at right angles to it in the plane of `normal`, none negative. With `across` zero a circle of

@@ -54,6 +54,7 @@ struct LawForce {
   Vec3 texture = Vec3::Zero();   ///< N, the part that is texture
   bool pulls = false;            ///< a sticky surface holds the probe back: `penetration` is how far it was drawn off
   double held = 0.0;             ///< J, in the spring of a friction law
+  Vec3 drawn = Vec3::Zero();     ///< N, what that spring pulls with
   bool turns = false;            ///< `turn` is known
   Vec3 turn;                     ///< N, lateral force of consistent shading, to be added as far as it is paid
   bool bends = false;            ///< `bend` is known

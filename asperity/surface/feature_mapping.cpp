@@ -49,6 +49,15 @@ bool is_round(IntermediateSurface surface) {
   return surface == IntermediateSurface::cylinder || surface == IntermediateSurface::sphere;
 }
 
+Status check_range(const Vec2& range) {
+  constexpr double turn = 2.0 * pi;
+  constexpr double rounding = 1e-9;
+  const double width = range.y() - range.x();
+  if (std::abs(range.x()) <= turn && width > 0.0 && width <= turn + rounding) return success();
+  return bad_value(fmt::format("goes from {:.6g} to {:.6g} rad", range.x(), range.y()), "range",
+                   "two angles, the first within one turn of 0, the second above it by one turn (6.28319 rad) at most");
+}
+
 /// Lengths near by of which a whole number fits `around`, "1.2 mm or 1.3 mm".
 std::string fitting(double around, double wanted) {
   const double count = around / wanted;
@@ -62,7 +71,7 @@ std::string fitting(double around, double wanted) {
 Error no_fit(double turns, const char* of_what, std::string place, std::string accepted) {
   return refused(ErrorCode::mismatch,
                  fmt::format("{:.6g} {} go once around: the pattern would not close", turns, of_what), std::move(place),
-                 std::move(accepted));
+                 std::move(accepted) + ", or a cylinder or sphere with a range, at whose seam it may step");
 }
 
 }  // namespace
@@ -76,7 +85,14 @@ Result<FeatureMapping> FeatureMapping::build(const FeatureMappingSettings& setti
   }
   ASPERITY_CHECK(check_frame(settings));
   mapping.second_ = settings.axis.cross(settings.reference);
-  if (is_round(settings.surface)) ASPERITY_CHECK(check_mapping_length(settings.radius, "radius"));
+  if (is_round(settings.surface)) {
+    ASPERITY_CHECK(check_mapping_length(settings.radius, "radius"));
+    if (settings.range) {
+      ASPERITY_CHECK(check_range(*settings.range));
+      mapping.middle_ = settings.range->mean();
+      mapping.half_ = 0.5 * (settings.range->y() - settings.range->x());
+    }
+  }
   if (settings.surface == IntermediateSurface::box) {
     for (int k = 0; k < 3; ++k) ASPERITY_CHECK(check_mapping_length(settings.half_extent[k], "half_extent"));
   }
@@ -136,7 +152,9 @@ void FeatureMapping::map(const Vec3& point, MappedPlaces& out) const noexcept {
   const double distance = std::sqrt(squared);
   const bool off_axis = distance > on_axis;
   const double radius = settings_.radius;
-  place.uv.x() = radius * std::atan2(local.y(), local.x());
+  double angle = std::atan2(local.y(), local.x());
+  if (settings_.range) angle = std::remainder(angle - middle_, 2.0 * pi) + half_;
+  place.uv.x() = radius * angle;
   if (off_axis) place.du = (radius / squared) * (local.x() * second_ - local.y() * settings_.reference);
   if (settings_.surface == IntermediateSurface::cylinder) {
     place.uv.y() = local.z();
@@ -169,7 +187,26 @@ MappedPlace FeatureMapping::on_mesh(const TriangleMesh& mesh, std::uint32_t face
 }
 
 double FeatureMapping::circumference() const noexcept {
-  return is_round(settings_.surface) ? 2.0 * pi * settings_.radius : 0.0;
+  return is_round(settings_.surface) && !settings_.range ? 2.0 * pi * settings_.radius : 0.0;
+}
+
+FeatureMapping::Seam FeatureMapping::seam() const noexcept {
+  return {middle_ + pi, settings_.radius * (half_ + pi), settings_.radius * (half_ - pi)};
+}
+
+void FeatureMapping::count_angle_twice(const Vec3& point, const Vec3& normal, MappedPlace& place) const noexcept {
+  if (settings_.surface != IntermediateSurface::cylinder) return;
+  const Vec3 from_origin = point - settings_.origin;
+  const Vec3 around = settings_.axis.cross(from_origin);  // as long as the distance from the axis
+  const double squared = around.squaredNorm();
+  // At a given distance the surface climbs by -(normal . around) / (normal . axis) per radian. One that turns about the
+  // axis does not climb, but for rounding: no height tells the angle there.
+  constexpr double level = 1e-9;
+  const double leaning = normal.dot(around);
+  if (!(leaning * leaning > level * level * squared)) return;
+  const double by_height = -normal.dot(settings_.axis) / leaning;
+  const double unit = settings_.radius * (settings_.range ? 2.0 * half_ : 2.0 * pi);
+  place.du += (settings_.radius * by_height * unit / std::sqrt(squared)) * settings_.axis;
 }
 
 Status FeatureMapping::check(const SurfaceFeature& feature) const {
@@ -216,7 +253,8 @@ Status FeatureMapping::check(const SurfaceFeature& feature) const {
     case FeatureKind::circular_grating: break;
   }
   return refused(ErrorCode::mismatch, "circles do not close around a cylinder or a sphere", "kind",
-                 "another kind of feature, or a plane, a box or texture coordinates to map it by");
+                 "another kind of feature, a plane, a box or texture coordinates to map it by, or a range, at whose "
+                 "seam it may step");
 }
 
 }  // namespace asperity

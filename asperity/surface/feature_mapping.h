@@ -2,6 +2,7 @@
 // Laying features on a surface: the two-stage shrink-wrap mapping (heterogeneous-features-2008, section 3.2).
 
 #include <cstdint>
+#include <optional>
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/formulation.h"
@@ -34,10 +35,14 @@ struct Names<IntermediateSurface> {
 /// Settings of FeatureMapping.
 struct FeatureMappingSettings {
   IntermediateSurface surface = IntermediateSurface::plane;
-  Vec3 origin = Vec3::Zero();       ///< object frame (m)
-  Vec3 axis = Vec3::UnitZ();        ///< unit; normal of the plane, axis of the cylinder
-  Vec3 reference = Vec3::UnitX();   ///< unit, at right angles to the axis
-  double radius = 0.0;              ///< cylinder, sphere: above 0 (m)
+  Vec3 origin = Vec3::Zero();      ///< object frame (m)
+  Vec3 axis = Vec3::UnitZ();       ///< unit; normal of the plane, axis of the cylinder
+  Vec3 reference = Vec3::UnitX();  ///< unit, at right angles to the axis
+  double radius = 0.0;             ///< cylinder, sphere: above 0 (m)
+  /// cylinder, sphere: angles [theta_1, theta_2] (rad) that features are wrapped over (eq. 6), from which on u counts;
+  /// at most one turn. They go on beyond both up to the seam opposite their middle, and need not close: where they
+  /// do not, their heights step there. Without a range u goes once around and they have to.
+  std::optional<Vec2> range = std::nullopt;
   Vec3 half_extent = Vec3::Zero();  ///< box: above 0 (m), along reference, axis x reference, axis
   Vec2 tile = Vec2::Ones();         ///< uv: m per unit, above 0
 };
@@ -65,17 +70,33 @@ class FeatureMapping {
   [[nodiscard]] MappedPlace on_mesh(const TriangleMesh& mesh, std::uint32_t face, const Vec3& point) const noexcept;
 
   [[nodiscard]] const FeatureMappingSettings& settings() const noexcept { return settings_; }
-  /// Length (m) after which u comes back to where it started, 0 where it does not: around a cylinder or a sphere. [any]
+  /// Length (m) after which u comes back to where it started, 0 where it need not: around a cylinder or a sphere
+  /// without a range. [any]
   [[nodiscard]] double circumference() const noexcept;
   /// Whether a feature closes where u comes back: a whole number of repeats has to go once around, to a ten-thousandth
   /// of one; circles never close. Errors: mismatch, naming the nearest lengths that fit. [build]
   [[nodiscard]] Status check(const SurfaceFeature& feature) const;
+  /// The angle of the seam (rad, from the reference) and what u is just before and behind it (m). A round mapping.
+  /// [any]
+  struct Seam {
+    double angle = 0.0;
+    double last = 0.0;
+    double first = 0.0;
+  };
+  [[nodiscard]] Seam seam() const noexcept;
+  /// Counts the angle around a cylinder once more, as the example of section 3.1.3 prints it (erratum c): where the
+  /// height along the axis of a surface with this normal changes with the angle, du gains the angle's derivative by
+  /// that height, over the distance from the axis in the example's unit, which is the length that eq. 6 calls 1. Other
+  /// surfaces between are left as they are. [servo]
+  void count_angle_twice(const Vec3& point, const Vec3& normal, MappedPlace& place) const noexcept;
 
  private:
   void map_box(const Vec3& local, MappedPlaces& out) const noexcept;
 
   FeatureMappingSettings settings_;
   Vec3 second_ = Vec3::UnitY();  // axis x reference
+  double middle_ = 0.0;          // of the range (rad)
+  double half_ = 0.0;            // width of the range (rad)
 };
 
 /// The part of `gradient` in the tangent plane of a surface with unit normal `normal`: what a surface gradient is

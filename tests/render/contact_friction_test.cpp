@@ -94,6 +94,32 @@ TEST(ContactFriction, Y_8_coefficient_by_direction) {
   }
 }
 
+TEST(Rows, Eq15_k_s_is_felt_by_direction) {
+  // 250 N/m along y, the gradient of the features, 100 N/m along x; limits and k_d alike in every direction.
+  for (const bool literal : {true, false}) {
+    Instance instance = rough(FrictionKind::karnopp, literal ? Formulation::literal : Formulation::consistent);
+    instance.material.static_friction = instance.material.dynamic_friction = 0.4;
+    instance.material.friction.stiffness = 250.0;
+    instance.material.friction.break_away = 0.4;
+    FineSettings settings = fine_settings({});
+    settings.lay.stiffness_ratio = 0.4;
+    settings.lay.direction = 0.5 * std::numbers::pi;
+    settings.lay.formulation = literal ? Formulation::literal : Formulation::consistent;
+    instance.fine = fine(settings);
+    const Scene scene = scene_with(instance);
+    for (const double degrees : {0.0, 30.0, 60.0, 90.0}) {
+      const double a = degrees * std::numbers::pi / 180.0;
+      const Vec3 way(std::sin(a), std::cos(a), 0.0);
+      // 2 mm/s over 1 mm: it sticks.
+      const ForceSample last = stroke(scene, drag(way, 1e-3, 2e-3)).back();
+      const Vec3 expected = literal ? Vec3(-1e-3 * (250.0 - 150.0 * degrees / 90.0) * way)
+                                    : Vec3(-1e-3 * Vec3(100.0 * way.x(), 250.0 * way.y(), 0.0));
+      EXPECT_NEAR((last.parts.friction - expected).norm(), 0.0, 1e-6)
+          << degrees << " " << last.parts.friction.transpose();
+    }
+  }
+}
+
 TEST(ContactFriction, Steady_sliding_holds_the_dynamic_coefficient_under_every_law) {
   for (const FrictionKind kind : all_kinds()) {
     if (kind == FrictionKind::viscous) continue;

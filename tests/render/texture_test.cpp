@@ -252,7 +252,8 @@ TEST(Texture, Erratum_c_the_printed_gradient_counts_the_angle_twice) {
   const auto ramp = std::make_shared<const ParametricSurface>(must(ParametricSurface::build(formula)));
   FeatureMappingSettings mapping;
   mapping.surface = IntermediateSurface::cylinder;
-  mapping.radius = 0.01;
+  mapping.radius = 0.01 / pi;
+  mapping.range = Vec2(0.0, pi);
   const SurfaceFeature waves = grating(0.02e-3, 2.0 * pi * 0.01 / 20.0);
   for (const double r : {1.2, 2.0, 2.7}) {
     const ParametricJet jet = ramp->jet({0.77, r});

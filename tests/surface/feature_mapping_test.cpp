@@ -101,10 +101,26 @@ struct Ramp {
         normal(along_r.cross(along_t).normalized()) {}
 };
 
+/// Eq. 6 over theta in [from, to]: u is 1 after that, round the axis of the example.
+FeatureMapping example_mapping(double from, double to) {
+  FeatureMappingSettings settings;
+  settings.surface = IntermediateSurface::cylinder;
+  settings.radius = 1.0 / (to - from);
+  settings.range = Vec2(from, to);
+  return mapping_of(settings);
+}
+
 TEST(Rows, Y2HeightAndGradientOnTheRamp) {
-  // A cylinder of radius 1 / pi makes u = theta / pi.
-  const FeatureMapping mapping = round_mapping(IntermediateSurface::cylinder, 1.0 / pi);
+  // h = 0.01 cos 20 u over theta in [0, pi]: 6.37 waves a turn, which close around no cylinder.
+  const FeatureMapping mapping = example_mapping(0.0, pi);
   const SurfaceFeature feature = grating(0.01, 2.0 * pi / 20.0);
+  EXPECT_TRUE(mapping.check(feature).ok());
+  const Status around = round_mapping(IntermediateSurface::cylinder, 1.0 / pi).check(feature);
+  ASSERT_FALSE(around.ok());
+  EXPECT_NE(around.error().message().find("6.3662 wavelengths go once around"), std::string::npos)
+      << around.error().message();
+  EXPECT_NE(around.error().accepted.find("with a range, at whose seam it may step"), std::string::npos)
+      << around.error().message();
   for (double r = 1.0; r <= 3.0; r += 0.25) {
     for (double t = 0.05; t < pi - 0.04; t += 0.1) {
       const Ramp ramp(r, t);
@@ -133,7 +149,66 @@ TEST(Rows, Y2HeightAndGradientOnTheRamp) {
       const double y = ramp.point.y();
       const Vec3 printed = along_t * Vec3(-y / (x * x + y * y), x / (x * x + y * y), 1.0 / (3.0 * r));
       EXPECT_NEAR(printed.dot(ramp.along_t), (1.0 + 1.0 / r) * gradient.dot(ramp.along_t), 1e-13);
+      MappedPlace twice = places(mapping, ramp.point)[0];
+      mapping.count_angle_twice(ramp.point, ramp.normal, twice);
+      EXPECT_LT((feature.sample(twice.uv).gradient.x() * twice.du - printed).norm(), 1e-13);
     }
+  }
+}
+
+TEST(Rows, Y2AWrapThatNeedNotCloseStepsAtItsSeamAlone) {
+  const FeatureMapping mapping = example_mapping(0.0, pi);
+  const SurfaceFeature feature = grating(0.01, 2.0 * pi / 20.0);
+  // Once around. Elsewhere heights change by no more than the slope by theta, 0.01 x 20 / pi, times the step.
+  constexpr int steps = 20'000;
+  const auto height = [&](int i) { return laid(mapping, feature, Ramp(2.0, 2.0 * pi * i / steps).point).height; };
+  int jumps = 0;
+  for (int i = 1; i <= steps; ++i) {
+    const double change = height(i) - height(i - 1);
+    if (std::abs(change) <= 0.2 / pi * (2.0 * pi / steps)) continue;
+    ++jumps;
+    // Opposite the middle of the range, from u = 1.5 to u = -0.5.
+    EXPECT_NEAR(2.0 * pi * (i - 0.5) / steps, 1.5 * pi, 2.0 * pi / steps);
+    EXPECT_NEAR(change, 0.01 * (std::cos(20.0 * 0.5) - std::cos(20.0 * 1.5)), 1e-4);
+  }
+  EXPECT_EQ(jumps, 1);
+  EXPECT_NEAR(mapping.seam().angle, 1.5 * pi, 1e-12);
+  EXPECT_NEAR(mapping.seam().last, 1.5, 1e-12);
+  EXPECT_NEAR(mapping.seam().first, -0.5, 1e-12);
+  EXPECT_EQ(mapping.circumference(), 0.0);
+}
+
+TEST(Rows, Y2TheRangeBeginsAtItsFirstAngle) {
+  // Erratum b: (theta - theta_1) / (theta_2 - theta_1), over whatever angles.
+  for (const auto& [from, to] : {std::pair{-2.0, -0.5}, {0.4, 1.1}, {2.5, 5.0}, {-0.5, 2.0 * pi - 0.5}}) {
+    const FeatureMapping mapping = example_mapping(from, to);
+    for (const double share : {0.001, 0.3, 0.999}) {
+      const double theta = from + share * (to - from);
+      EXPECT_NEAR(places(mapping, Vec3(std::cos(theta), std::sin(theta), 0.2))[0].uv.x(), share, 1e-12);
+    }
+  }
+}
+
+TEST(Rows, Y2ErratumCHoldsForAnySurfaceThatClimbsAroundTheAxis) {
+  // A plane z = a x is z = a r cos theta: at a given r theta changes by -1 / (a y) per height. The unit is a whole
+  // turn.
+  const FeatureMapping mapping = round_mapping(IntermediateSurface::cylinder, 0.02);
+  constexpr double slope = 0.7;
+  for (const auto& [x, y] : {std::pair{0.03, 0.02}, {-0.01, 0.015}, {0.02, -0.04}}) {
+    const Vec3 point(x, y, slope * x);
+    const MappedPlace once = places(mapping, point)[0];
+    MappedPlace twice = once;
+    mapping.count_angle_twice(point, Vec3(-slope, 0.0, 1.0).normalized(), twice);
+    const double unit = 2.0 * pi * 0.02;
+    EXPECT_LT((twice.du - once.du - Vec3(0.0, 0.0, -0.02 / (slope * y) * unit / std::hypot(x, y))).norm(), 1e-12);
+  }
+  // What turns about the axis, and a plane across it, climb nowhere.
+  for (const Vec3& normal : {Vec3(0.6, 0.0, 0.8), Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)}) {
+    const Vec3 point(0.03, 0.0, 0.01);
+    MappedPlace place = places(mapping, point)[0];
+    const Vec3 before = place.du;
+    mapping.count_angle_twice(point, normal, place);
+    EXPECT_EQ(place.du, before);
   }
 }
 
@@ -459,6 +534,10 @@ TEST(FeatureMapping, RefusesEachMemberByName) {
       {IntermediateSurface::cylinder, [](auto& s) { s.radius = 0.0; }, "radius"},
       {IntermediateSurface::sphere, [=](auto& s) { s.radius = nan; }, "radius"},
       {IntermediateSurface::sphere, [](auto& s) { s.radius = infinity; }, "radius"},
+      {IntermediateSurface::cylinder, [](auto& s) { s.range = Vec2(0.5, 0.5); }, "range"},
+      {IntermediateSurface::cylinder, [](auto& s) { s.range = Vec2(0.0, 6.3); }, "range"},
+      {IntermediateSurface::sphere, [](auto& s) { s.range = Vec2(6.3, 7.0); }, "range"},
+      {IntermediateSurface::sphere, [=](auto& s) { s.range = Vec2(0.0, nan); }, "range"},
       {IntermediateSurface::box, [](auto& s) { s.half_extent.z() = -1.0; }, "half_extent"},
       {IntermediateSurface::uv, [](auto& s) { s.tile.y() = 0.0; }, "tile"},
       {IntermediateSurface::uv, [=](auto& s) { s.tile.x() = nan; }, "tile"},

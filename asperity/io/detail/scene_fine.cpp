@@ -89,6 +89,7 @@ class MappingReader {
       settings_.radius = reader_.get("radius", std::max(half.x(), half.y()));
     if (settings_.surface == IntermediateSurface::sphere) settings_.radius = reader_.get("radius", half.maxCoeff());
     if (settings_.surface == IntermediateSurface::box) settings_.half_extent = reader_.get("half_extent", half);
+    settings_.range = reader_.find<Vec2>("range");
   }
 
   /// The middle of a sheet is looked at from above, and so is a vase.
@@ -235,6 +236,7 @@ class TextureReader {
     } else {
       as_ = reader_.get<std::optional<FeatureScale>>("as");
       ASPERITY_CHECK(read_features());
+      note_seam();
     }
     ASPERITY_CHECK(reader_.status());
     return std::move(part_);
@@ -326,6 +328,32 @@ class TextureReader {
     context_.note(fmt::format("surface \"{}\": {} of {} is felt as {}{} ({})", host_.name,
                               feature_name(feature.spec().kind), format_length(feature.wavelength()), scale_name(scale),
                               own == scale ? "" : ", as the scene asks", why));
+  }
+
+  /// What is wrapped over a range need not close: says where it steps, and by how much.
+  void note_seam() {
+    const FeatureMapping& mapping = part_.fine.mapping;
+    if (!mapping.settings().range) return;
+    constexpr int places = 1024;
+    const FeatureMapping::Seam seam = mapping.seam();
+    const double reach = host_.bounds.extent().norm();
+    double step = 0.0;
+    for (int i = 0; i <= places; ++i) {
+      const double v = reach * (static_cast<double>(i) / places - 0.5);
+      double here = 0.0;
+      for (const auto* features : {&part_.fine.texture, &part_.geometry}) {
+        for (const SurfaceFeature& feature : *features)
+          here += feature.sample(Vec2(seam.last, v)).height - feature.sample(Vec2(seam.first, v)).height;
+      }
+      step = std::max(step, std::abs(here));
+    }
+    constexpr double nothing = 1e-9;  // m
+    if (step < nothing) return;
+    constexpr double degree = pi / 180.0;
+    context_.note(fmt::format(
+        "surface \"{}\": features wrapped over a range have a seam {:.4g} deg from the reference: what lies there is "
+        "felt as a step of up to {}",
+        host_.name, seam.angle / degree, format_length(step)));
   }
 
   [[nodiscard]] Status check_geometry(const SurfaceFeature& feature, const std::string& place) const {

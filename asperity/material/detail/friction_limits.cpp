@@ -84,8 +84,7 @@ void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, con
   const FrictionCoefficients& coefficients = contact.coefficients;
   Vec3 across = coefficients.across - normal.dot(coefficients.across) * normal;
   const double length = across.norm();
-  // Along the normal there is no lay to speak of.
-  if (!(length > 1e-6)) return;
+  if (!(length > no_lay)) return;
   across /= length;
   const Vec3 lay = normal.cross(across);
   const double still = tangent.still.across;
@@ -97,6 +96,7 @@ void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, con
     const double sliding_here = sliding * (1.0 - (1.0 - coefficients.sliding_ratio) * share);
     tangent.still = {still_here, still_here};
     tangent.sliding = {sliding_here, sliding_here};
+    tangent.stiffness *= 1.0 - (1.0 - coefficients.stiffness_ratio) * share;
     return;
   }
   tangent.round = false;
@@ -104,6 +104,14 @@ void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, con
   tangent.lay = lay;
   tangent.still.lay = still * coefficients.still_ratio;
   tangent.sliding.lay = sliding * coefficients.sliding_ratio;
+  if (coefficients.stiffness_ratio == 1.0) return;
+  const double root = std::sqrt(coefficients.stiffness_ratio);
+  tangent.lay_root = root;
+  tangent.motion = tangent.scaled(tangent.motion, 1.0, root);
+  tangent.velocity = tangent.scaled(tangent.velocity, 1.0, root);
+  tangent.drift = tangent.scaled(tangent.drift, 1.0, 1.0 / root);
+  tangent.still.lay /= root;
+  tangent.sliding.lay /= root;
 }
 
 Vec3 nearest_in_ellipse(const Vec3& pull, const Vec3& normal, const Vec3& across, double along_across,

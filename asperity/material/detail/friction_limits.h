@@ -15,6 +15,9 @@ struct Limits {
   double lay = 0.0;
 };
 
+/// Length of a direction across the lay within the tangent plane below which there is no lay to speak of.
+inline constexpr double no_lay = 1e-6;
+
 /// The point of the disc of `radius` that is nearest to `pull`. [servo]
 inline Vec3 nearest_in_circle(const Vec3& pull, double radius) noexcept {
   const double square = pull.squaredNorm();
@@ -22,11 +25,17 @@ inline Vec3 nearest_in_circle(const Vec3& pull, double radius) noexcept {
   return (radius / std::sqrt(square)) * pull;
 }
 
-/// One tick of a contact, reduced to its tangent plane.
+/// One tick of a contact, reduced to its tangent plane. A spring of two stiffnesses K and r² K (along the lay) is one
+/// of K for who measures motion along the lay by r and forces by 1 / r: work and energy stay what they are, and nearest
+/// points of the limits become those that dissipate most. Laws see all but `speed` and `drift` that way, and what they
+/// answer is `felt` as a force.
 struct TangentContact {
   Vec3 motion;             ///< m
-  Vec3 velocity;           ///< m/s
-  double stiffness = 0.0;  ///< N/m, the law's own or the contact's
+  Vec3 velocity;           ///< m/s, as the motion is measured
+  Vec3 drift;              ///< m/s, as forces are measured
+  double speed = 0.0;      ///< m/s
+  double lay_root = 1.0;   ///< r
+  double stiffness = 0.0;  ///< N/m, the law's own or the contact's, across the lay
   double dt = 0.0;         ///< s
   Limits still;            ///< N
   Limits sliding;          ///< N
@@ -38,6 +47,10 @@ struct TangentContact {
   [[nodiscard]] Vec3 scaled(const Vec3& v, double by_across, double by_lay) const noexcept {
     if (round) return by_across * v;
     return (by_across * v.dot(across)) * across + (by_lay * v.dot(lay)) * lay;
+  }
+  /// A law's answer as a force (N). [servo]
+  [[nodiscard]] Vec3 felt(const Vec3& force) const noexcept {
+    return lay_root == 1.0 ? force : scaled(force, 1.0, lay_root);
   }
   /// `pull` is on or within the ellipse. [servo]
   [[nodiscard]] bool within(const Vec3& pull, const Limits& limits) const noexcept {
@@ -63,8 +76,8 @@ struct TangentContact {
   [[nodiscard]] Vec3 nearest_by_sides(const Vec3& pull, const Limits& limits) const noexcept;
 };
 
-/// Sets the axes and what the limits are along them, or by the direction (literal), from circles. `stretch`: which way
-/// the contact is strained, for an angle where nothing moves. [servo]
+/// Sets the axes and what limits and stiffness are along them, or by the direction (literal), from those across the
+/// lay. `stretch`: which way the contact is strained, for an angle where nothing moves. [servo]
 void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, const Vec3& stretch) noexcept;
 
 /// The tick without what is along the normal, with both limits. [servo]
@@ -75,6 +88,8 @@ inline TangentContact tangent_contact(const FrictionLaw& law, const FrictionCont
   TangentContact tangent;
   tangent.motion = contact.motion - normal.dot(contact.motion) * normal;
   tangent.velocity = contact.velocity - normal.dot(contact.velocity) * normal;
+  tangent.drift = tangent.velocity;
+  tangent.speed = tangent.velocity.norm();
   tangent.stiffness = law.stiffness > 0.0 ? law.stiffness : contact.stiffness;
   tangent.dt = contact.dt.count();
   const double push = std::max(0.0, contact.push);
@@ -82,7 +97,8 @@ inline TangentContact tangent_contact(const FrictionLaw& law, const FrictionCont
   const double sliding = coefficients.sliding * push;
   tangent.still = {still, still};
   tangent.sliding = {sliding, sliding};
-  if (coefficients.still_ratio != 1.0 || coefficients.sliding_ratio != 1.0) set_anisotropy(tangent, contact, stretch);
+  if (coefficients.still_ratio != 1.0 || coefficients.sliding_ratio != 1.0 || coefficients.stiffness_ratio != 1.0)
+    set_anisotropy(tangent, contact, stretch);
   return tangent;
 }
 

@@ -37,13 +37,13 @@ void place_contact(const Instance& instance, const Place& place, const Vec3& poi
     out.push_back(mapping.on_mesh(mesh->mesh(), place.element, point));
 }
 
-/// Erratum c as printed: on the ramp the angle is counted once more, by the height that grows with it.
-void count_angle_twice(const Instance& instance, const Place& at, MappedPlaces& places) noexcept {
-  const FeatureMappingSettings& mapping = instance.fine->settings().mapping.settings();
+/// The gradient as the printed example takes it (erratum c), which needs a formula that gives the angle by the height:
+/// triangles and voxels have none.
+void as_printed(const Instance& instance, const Place& at, const Vec3& point, MappedPlaces& places) noexcept {
   const ParametricSurface* surface = parametric_of(instance.surface);
-  if (surface == nullptr || mapping.surface != IntermediateSurface::cylinder) return;
-  const double rise = surface->printed_rise(at.at.head<2>());
-  for (MappedPlace& place : places) place.du += mapping.radius * rise * mapping.axis;
+  if (surface == nullptr) return;
+  const Vec3 normal = surface->normal(surface->jet(at.at.head<2>()));
+  for (MappedPlace& place : places) instance.fine->settings().mapping.count_angle_twice(point, normal, place);
 }
 
 /// Height of a texture over its surface and the height's gradient in space.
@@ -203,6 +203,7 @@ void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const 
   const LayMatrix slides = LayMatrix::of(sliding, sliding * settings.lay.sliding_ratio, lay) + added;
   Vec2 axis = slides.principal();
   if (axis.isZero()) axis = holds.principal();
+  if (axis.isZero() && settings.lay.stiffness_ratio < 1.0) axis = lay;
   // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
   const Vec3 way = surface_gradient(axis.x() * place.du + axis.y() * place.dv, normal);
   const double length = way.norm();
@@ -218,6 +219,7 @@ void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const 
     coefficients.across = kept / rest;
     coefficients.still_ratio = ratio(holds.along(aside), coefficients.still);
     coefficients.sliding_ratio = ratio(slides.along(aside), coefficients.sliding);
+    coefficients.stiffness_ratio = settings.lay.stiffness_ratio;
   }
   coefficients.formulation = settings.lay.formulation;
 }
@@ -251,6 +253,7 @@ void add_friction(const Touched& touch, const Material& material, double stiffne
   }
   const Vec3 force = friction_force(material.friction, contact, held.friction);
   law.held = friction_energy(held.friction);
+  law.drawn = friction_spring(contact, held.friction);
   law.friction = force;
   law.force += force;
 }
@@ -295,7 +298,7 @@ bool add_fine_forces(const Touched& touch, const Material& material, bool fricti
     const bool from_coat = settings.source == TextureSource::coat;
     const Place place{law.element, false, touch.contact->first().at};
     if (!from_coat || fine->shapes_friction()) place_contact(instance, place, law.point, places);
-    if (literal) count_angle_twice(instance, place, places);
+    if (literal) as_printed(instance, place, law.point, places);
     if (fine->has_texture()) {
       const ReliefSurface* relief = relief_of(instance);
       TextureSample texture;

@@ -16,6 +16,8 @@ Status check_lay(const FrictionLay& lay) {
   const auto share = [](double value) { return value >= 0.0 && value <= 1.0; };
   if (!share(lay.still_ratio)) return bad_value(fmt::format("is {}", lay.still_ratio), "still_ratio", "0 to 1");
   if (!share(lay.sliding_ratio)) return bad_value(fmt::format("is {}", lay.sliding_ratio), "sliding_ratio", "0 to 1");
+  if (!(lay.stiffness_ratio >= 0.01 && lay.stiffness_ratio <= 1.0))
+    return bad_value(fmt::format("is {}", lay.stiffness_ratio), "stiffness_ratio", "0.01 to 1");
   if (lay.direction && !std::isfinite(*lay.direction))
     return bad_value(fmt::format("is {}", *lay.direction), "direction", "an angle");
   return success();
@@ -104,7 +106,7 @@ Result<FineFeatures> FineFeatures::build(FineSettings settings) {
   fine.micro_across_ = fine.interlock_.principal();
   fine.rings_ = settings.micro.size() == 1 && settings.micro.front().spec().kind == FeatureKind::circular_grating;
   fine.shapes_friction_ = !settings.micro.empty() || map.factors != nullptr || settings.lay.still_ratio < 1.0 ||
-                          settings.lay.sliding_ratio < 1.0;
+                          settings.lay.sliding_ratio < 1.0 || settings.lay.stiffness_ratio < 1.0;
   fine.settings_ = std::move(settings);
   return fine;
 }

@@ -24,8 +24,9 @@ struct FrictionMap {
 
 /// Friction that depends on the direction.
 struct FrictionLay {
-  double still_ratio = 1.0;    ///< static coefficient along the lay over that across it, 0 to 1
-  double sliding_ratio = 1.0;  ///< dynamic one, likewise
+  double still_ratio = 1.0;      ///< static coefficient along the lay over that across it, 0 to 1
+  double sliding_ratio = 1.0;    ///< dynamic one, likewise
+  double stiffness_ratio = 1.0;  ///< of the friction law's spring (k_s of eq. 13), likewise, 0.01 to 1
   /// literal: eq. 15, interpolated by the velocity's angle to the gradient; consistent: elliptic.
   Formulation formulation = Formulation::consistent;
   /// Direction across the lay (rad from u towards v). Without one it is that of the micro features, else of the first
@@ -73,7 +74,8 @@ struct FineSettings {
   std::vector<SurfaceFeature> micro;
   /// Of the texture force.
   ///   literal     -grad h N with N the constraint's force (eq. 12), which feeds energy (erratum k), and the gradient
-  ///               in space (eq. 8) rather than along the surface
+  ///               in space (eq. 8) rather than along the surface; on a formula's surface around a cylinder the angle
+  ///               counts twice (erratum c)
   ///   consistent  the slope of one potential: spring force k p with p the penetration to the relief, whose crests lie
   ///               on the surface
   Formulation formulation = Formulation::consistent;

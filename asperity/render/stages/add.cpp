@@ -86,6 +86,7 @@ void to_world(const Touched& touch, LawForce& law) noexcept {
   law.force = touch.turned(law.force);
   law.spring = touch.turned(law.spring);
   law.friction = touch.turned(law.friction);
+  law.drawn = touch.turned(law.drawn);
   law.texture = touch.turned(law.texture);
   if (law.turns) law.turn = touch.turned(law.turn);
   law.point = touch.to_world(law.point);
@@ -143,7 +144,7 @@ void settle_loose(Tick& tick, const Touched& touch, double rendered, LawForce& l
   const bool printed = instance.material.friction.formulation == Formulation::literal;
   const double stiffness = rendered * friction.stiffness;
   if (law.contact && stiffness > 0.0 && !printed) {
-    const Vec3 spring = -stiffness * touch.turned(friction.stretch);
+    const Vec3 spring = rendered * law.drawn;
     loose -= spring;
     const double share = account.hold(touch.moved ? Giver::motion : Giver::friction, contact.drag,
                                       {spring, stiffness, rendered * law.held});

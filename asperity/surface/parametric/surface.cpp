@@ -342,11 +342,6 @@ double ParametricSurface::clearance(const Vec2& uv, const Vec3& point) const noe
   return n.n.dot(off) + height - feature_heights(settings_, below).height;
 }
 
-double ParametricSurface::printed_rise(const Vec2& uv) const noexcept {
-  if (settings_.shape != ParametricShape::ramp) return 0.0;
-  return 1.0 / (3.0 * uv.y() * settings_.scale);
-}
-
 Vec2 ParametricSurface::within_range(const Vec2& uv) const noexcept {
   Vec2 out = uv;
   for (int k = 0; k < 2; ++k) {

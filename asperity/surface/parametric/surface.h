@@ -95,9 +95,6 @@ class ParametricSurface {
   /// Height (m) of a point, very near to the surface at `uv`, over the features that are below it; below 0 under them.
   /// [servo]
   [[nodiscard]] double clearance(const Vec2& uv, const Vec3& point) const noexcept;
-  /// What the printed example adds to the gradient of the angle (per m, along +z): 1 / (3 r) on the ramp, which counts
-  /// theta twice (erratum c); 0 on other shapes. [servo]
-  [[nodiscard]] double printed_rise(const Vec2& uv) const noexcept;
   [[nodiscard]] Vec2 lower() const noexcept { return lower_; }  ///< of the parameters
   [[nodiscard]] Vec2 upper() const noexcept { return upper_; }
   [[nodiscard]] bool closed_u() const noexcept { return closed_[0]; }  ///< u comes back to where it started
