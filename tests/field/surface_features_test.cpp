@@ -7,7 +7,6 @@
 #include <functional>
 #include <limits>
 #include <numbers>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -304,40 +303,6 @@ TEST(Rows, Y4PeakSlopes) {
   EXPECT_NEAR(steepest(0.5e-3, 2.5e-3), 1.257, 5e-4);
   EXPECT_NEAR(steepest(0.5e-3, 2.5e-3) / steepest(0.5e-3, 5e-3), 2.0, 1e-12);
   EXPECT_NEAR(steepest(0.25e-3, 5e-3), 0.314, 5e-4);  // if 0.5 mm is from crest to valley
-}
-
-/// Different heights at the places that a device of 0.02 mm can tell apart in one wavelength, the first one this share
-/// of a step from a crest.
-std::size_t levels(FeatureKind kind, double wavelength, double share) {
-  constexpr double resolution = 0.02e-3;
-  FeatureSpec spec = grating(1e-4, wavelength);
-  spec.kind = kind;
-  const SurfaceFeature feature = feature_of(spec);
-  std::set<long> heights;
-  for (int i = 0; i < static_cast<int>(std::lround(wavelength / resolution)); ++i)
-    heights.insert(std::lround(1e6 / 1e-4 * feature.sample(Vec2((i + share) * resolution, 0.0)).height));
-  return heights.size();
-}
-
-TEST(Rows, Y5LevelsThatADeviceCanTellApart) {
-  EXPECT_EQ(levels(FeatureKind::triangular, 0.5e-3, 0.25), 25U);
-  EXPECT_EQ(levels(FeatureKind::triangular, 0.1e-3, 0.25), 5U);
-  // Counted from a crest the two flanks share their levels, of triangles as of the cosine: about half are different.
-  EXPECT_EQ(levels(FeatureKind::triangular, 0.5e-3, 0.0), 13U);
-  EXPECT_EQ(levels(FeatureKind::grating, 0.5e-3, 0.0), 13U);
-  EXPECT_EQ(levels(FeatureKind::grating, 0.1e-3, 0.0), 3U);
-}
-
-TEST(Rows, Y9RoughnessOfTheMilledBlock) {
-  const double vertical = pi / 2.0 * 3.81e-6;
-  const double horizontal = pi / 2.0 * 0.33e-6;
-  EXPECT_NEAR(vertical, 5.985e-6, 1e-9);
-  EXPECT_NEAR(horizontal, 0.518e-6, 1e-9);
-  const SurfaceFeature feature = feature_of(grating(vertical, 50e-6));
-  EXPECT_NEAR(feature.roughness_along(0.0).average, 3.81e-6, 1e-12);
-  EXPECT_EQ(feature.roughness_along(pi / 2.0).average, 0.0);
-  EXPECT_EQ(feature.roughness_along(pi / 2.0).mean_slope, 0.0);
-  EXPECT_NEAR(feature_of(grating(horizontal, 50e-6)).roughness_along(0.0).average, 0.33e-6, 1e-12);
 }
 
 // ---- noise ---------------------------------------------------------------------------------------------------------

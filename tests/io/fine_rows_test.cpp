@@ -84,8 +84,7 @@ double foot_error(const Experiment& e) {
   return 1e-8 * first(e).material.stiffness;
 }
 
-// ---- Y-2: the example, as it is felt
-// ---------------------------------------------------------------------------------
+// ---- Y-2: the example, as it is felt ----
 
 constexpr double unit = 3e-3;  // m: 1 of the example
 
@@ -197,11 +196,7 @@ TEST(Rows, Y2_APartialWrapIsRefusedUntilARangeSaysWhereItsSeamIs) {
     const double wrapped_by = theta < 1.5 * pi ? theta : theta - 2.0 * pi;
     const double push = 1000.0 * (1e-3 + 0.1e-3 * (std::cos(20.0 * wrapped_by / pi) - 1.0));
     const double felt = force.dot(Vec3(std::cos(theta), std::sin(theta), 0.0));
-    // What a step up asks for and nobody has put in is rendered once it has been.
-    const bool paid = theta < 1.5 * pi || !probe.state().account.flow(Giver::spring).asked;
-    if (paid) {
-      ASSERT_NEAR(felt, push, 1e-5) << theta;
-    }
+    ASSERT_NEAR(felt, push, 1e-5) << theta;
     if (i > 0 && std::abs(felt - before) > 1000.0 * 0.1e-3 * 20.0 / pi * pi / steps * 1.01) {
       ++jumps;
       EXPECT_NEAR(theta, 1.5 * pi, pi / steps);
@@ -209,7 +204,8 @@ TEST(Rows, Y2_APartialWrapIsRefusedUntilARangeSaysWhereItsSeamIs) {
     before = felt;
   }
   EXPECT_EQ(jumps, 1);
-  // Around and around over the step the hand gets nothing.
+  // Around and around, up the step and down: the hand gets nothing but what the hold over a tick gives
+  // (docs/methods/energy.md: 1/2 L |dp|^2).
   for (const double way : {1.0, -1.0}) {
     Led round(e);
     double work = 0.0;
@@ -219,16 +215,20 @@ TEST(Rows, Y2_APartialWrapIsRefusedUntilARangeSaysWhereItsSeamIs) {
     for (int i = 0; i <= 10 * 2000; ++i) {
       const Vec3 next = at(way * 2.0 * pi * i / 2000.0, 9e-3 + 0.3e-3 * std::sin(7.0 * pi * i / 2000.0));
       work += pushed.dot(next - last);
+      pushed = round.force_at(next);
+      work -= 0.5 * round.state().account.stiffness() * (next - last).squaredNorm();
       most = std::max(most, work);
       last = next;
-      pushed = round.force_at(next);
     }
-    EXPECT_LE(most, 1e-12) << way;
+    EXPECT_LE(most, 1e-9) << way;
+    // Down the step nothing is asked for; up it more than was put in, which is not rendered.
+    const EnergyAccount::Flow& flow = round.state().account.flow(Giver::spring);
+    EXPECT_EQ(flow.asked > 0.0, way < 0.0);
+    EXPECT_LE(flow.paid, flow.asked);
   }
 }
 
-// ---- Y-3: a smooth plane
-// ---------------------------------------------------------------------------------------------
+// ---- Y-3: a smooth plane ----
 
 /// The force that is sent to the device, every tick of a session.
 std::vector<TraceRecord> session(const Experiment& e) {
@@ -264,23 +264,29 @@ double line_at(const std::vector<double>& samples, double frequency) {
   return std::hypot(cosine, sine) / gain;
 }
 
-/// Tangential and normal force of two seconds in the middle of a stroke by a trembling hand.
+constexpr double tremor_rms = 20e-6;  // m
+constexpr double settled = 1.5;       // s after the stroke has come down
+
+/// Tangential and normal force of two seconds of a stroke by a trembling hand; mass (kg) and damping (N s/m) of hand
+/// and device together.
 struct Felt {
   std::vector<double> lateral, normal;
+  double mass = 0.0, damping = 0.0, approach = 0.0;
 };
 Felt trembling(const std::string& scene, const char* speed, const char* press) {
   // A device without friction and steps of its own: all that is linear but the surface.
-  const std::string hand = R"("probe":{"kind":"dynamic","dynamic":{"tremor":"20 um"}},"rate":1000,)"
+  const std::string hand = R"("probe":{"kind":"dynamic","dynamic":{"tremor":"20 um"}},)"
                            R"("device":{"profile":"omega.3","friction":0,"position_resolution":0},)";
   const std::string json = R"({)" + hand +
                            R"("surfaces":[{"parametric":{"shape":"plane","width":"100 mm","depth":"60 mm"})" + scene +
                            R"(}],"stroke":{"type":"line","start":["10%","100%","50%"],"end":["90%","100%","50%"],)" +
                            R"("speed":")" + speed + R"(",)" + press + "}}";
   const Experiment e = scene_of(json);
-  Felt felt;
+  EXPECT_DOUBLE_EQ(e.simulated.tremor, tremor_rms);
+  Felt felt{{}, {}, e.hand.mass + e.device.mass, e.hand.damping + e.device.damping, e.path.approach_speed()};
   for (const TraceRecord& record : session(e)) {
     const Seconds since = record.probe.time - e.path.contact_begin();
-    if (since < Seconds(0.8) || felt.normal.size() == 2000) continue;
+    if (since < Seconds(settled) || felt.normal.size() == 2000) continue;
     felt.lateral.push_back(record.commanded.x());
     felt.normal.push_back(record.commanded.y());
   }
@@ -291,17 +297,17 @@ Felt trembling(const std::string& scene, const char* speed, const char* press) {
 TEST(Rows, Y3_ASmoothPlaneHasNoSpectralLineButTheTremors) {
   const char* deep = R"("depth":"1 mm")";
   const Felt slow = trembling("", "15 mm/s", deep);
-  const Felt fast = trembling("", "25 mm/s", deep);
+  const Felt fast = trembling("", "22 mm/s", deep);
   const Felt rough = trembling(
       R"(,"texture":{"features":{"type":"grating","amplitude":"0.25 mm","wavelength":"5 mm"},"as":"texture"})",
       "20 mm/s", deep);
-  // The tremor: four tones between 8 and 12 Hz.
+  // The tremor: four tones between 8 and 12 Hz, each rms / sqrt 2 in size. Hand, device and plane are a body on springs
+  // of 400 and 1000 N/m, which even in resonance answers with no more than the hand's spring over omega b.
+  const double tone = 1000.0 * 400.0 * tremor_rms / std::sqrt(2.0) / (2.0 * pi * 8.0 * slow.damping);
   double tremor = 0.0;
   for (double f = 6.0; f <= 14.0; f += 0.5) tremor = std::max(tremor, line_at(slow.normal, f));
-  EXPECT_GT(tremor, 1e-3);
-  // Each reaches four bins of 0.5 Hz, and 92 dB below itself beyond: four of them, each no larger than what is read in
-  // the band times the sum of its neighbours.
-  const double floor = 4.0 * std::pow(10.0, -92.0 / 20.0) * 4.0 * tremor;
+  EXPECT_GT(tremor, 0.1 * tone);
+  const double floor = 4.0 * std::pow(10.0, -92.0 / 20.0) * tone;
   for (double f = 2.5; f < 500.0; f += 0.5) {
     if (f > 5.5 && f < 14.5) continue;
     ASSERT_LT(line_at(slow.normal, f), floor) << f;
@@ -315,14 +321,16 @@ TEST(Rows, Y3_ASmoothPlaneHasNoSpectralLineButTheTremors) {
   // The same hand over gratings of 5 mm feels their line, at speed / wavelength.
   EXPECT_GT(line_at(rough.normal, 20.0 / 5.0), 1000.0 * floor);
   EXPECT_GT(line_at(rough.lateral, 20.0 / 5.0), 1000.0 * floor);
-  // A hand that presses with 1 N feels 1 N, however it trembles along the plane. It has come to rest to exp(-0.8 s x
-  // b / 2m), b = 6 N s/m, m = 0.2 kg at most.
+  // A hand that presses with 1 N feels 1 N, however it trembles along the plane: what is left of its push that sets in,
+  // and of the bounce that it comes down with, has died away by exp(-b / 2m t).
   const Felt pressed = trembling("", "20 mm/s", R"("normal_force":"1 N")");
-  for (const double force : pressed.normal) ASSERT_NEAR(force, 1.0, std::exp(-0.8 * 6.0 / 0.4));
+  const double bounce = 1.0 + pressed.approach * std::sqrt(1000.0 * pressed.mass);
+  const double left = bounce * std::exp(-settled * pressed.damping / (2.0 * pressed.mass));
+  EXPECT_LT(left, 1e-5);
+  for (const double force : pressed.normal) ASSERT_NEAR(force, 1.0, left);
 }
 
-// ---- Y-5: levels that a device can display
-// ---------------------------------------------------------------------------
+// ---- Y-5: levels that a device displays ----
 
 /// Different lateral forces that are sent to a Phantom Desktop, which tells places 20 um apart, within one wavelength
 /// of a triangular profile that begins this share of a step beside one of its places; and the most at one place.
@@ -333,7 +341,7 @@ struct Levels {
 Levels device_levels(double wavelength, double amplitude, double share, const char* formulation) {
   constexpr double resolution = 20e-6;
   const std::string json = fmt::format(
-      R"({{"probe":{{"kind":"dynamic"}},"rate":1000,"device":{{"profile":"phantom-desktop","position_resolution":{}}},)"
+      R"({{"probe":{{"kind":"dynamic"}},"device":{{"profile":"phantom-desktop","position_resolution":{}}},)"
       R"("surfaces":[{{"parametric":{{"shape":"plane"}},"texture":{{"formulation":"{}","as":"texture",)"
       R"("features":{{"type":"triangular","amplitude":{},"wavelength":{},"phase":{}}}}}}}],)"
       R"("stroke":{{"type":"line","start":["45%","100%","50%"],"end":["47%","100%","50%"],"speed":"1 mm/s",)"
@@ -374,8 +382,7 @@ TEST(Rows, Y5_LevelsOfTheForceThatTheDeviceDisplays) {
   }
 }
 
-// ---- Y-6: the vase
-// ---------------------------------------------------------------------------------------------------
+// ---- Y-6: the vase ----
 
 constexpr double widest = 30.08e-3;  // m, at 36 mm; a third of it at 96 mm
 constexpr double crest = 0.25e-3;
@@ -445,6 +452,7 @@ Ring ring(double z, double depth, const Force& force) {
 
 TEST(Rows, Y6_TheVaseIsThreeTimesAsSteepAtItsNeck) {
   const Experiment e = scene_of(builtin("vase"));
+  EXPECT_TRUE(has_note(e, "grating of 1.5 mm to 4.5 mm under the stroke"));
   const Experiment printed =
       scene_of(changed(builtin("vase"), R"("texture": {)", R"("texture": {"formulation":"literal",)"));
   const double k = first(e).material.stiffness;

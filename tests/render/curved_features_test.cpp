@@ -15,8 +15,7 @@ constexpr double pi = std::numbers::pi;
 constexpr double push = 0.6;  // N, as in Tab. 3
 constexpr double depth = push / stiffness;
 
-// ---- Y-8: friction by direction
-// --------------------------------------------------------------------------------------
+// ---- Y-8: friction by direction ----
 
 /// A surface of revolution about z: distance from the axis and height by a parameter, each with its derivative.
 struct Meridian {
@@ -191,8 +190,7 @@ TEST(Rows, Y8_on_a_sphere_a_map_of_friction_changes_it_from_place_to_place) {
   EXPECT_GT(most - least, 0.5 * push * 0.4);
 }
 
-// ---- Y-9: the roughness that is felt
-// ---------------------------------------------------------------------------------
+// ---- Y-9: the roughness that is felt ----
 
 /// Mean distance of the height, at which a force is felt, from its mean (m), along a line.
 double felt_average(const Scene& scene, double force, const Vec3& way, double length, int count) {
@@ -213,7 +211,7 @@ double felt_average(const Scene& scene, double force, const Vec3& way, double le
 TEST(Rows, Y9_the_felt_profile_of_the_milled_block_has_the_measured_roughness) {
   // Fig. 13: R_a of 3.81 um and 0.33 um, felt of gratings of c = 5.985 um and 0.518 um.
   const double wavelength = 0.1e-3;
-  constexpr int waves = 5;
+  constexpr int waves = 2;
   constexpr int samples = 400;  // a wave
   const struct { double amplitude, average; } measured[] = {{5.985e-6, 3.81e-6}, {0.518e-6, 0.33e-6}};
   for (const auto& [amplitude, average] : measured) {
