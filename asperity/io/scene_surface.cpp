@@ -9,6 +9,7 @@
 #include "asperity/io/detail/scene_fine.h"
 #include "asperity/io/detail/scene_layers.h"
 #include "asperity/io/gltf_material.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/surface/relief/closing.h"
 
 namespace asperity {

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <string>
 
@@ -93,6 +95,73 @@ TEST(MesostructureLibrary, OtherSizesLieOnTheSameRelief) {
       }
     }
   }
+}
+
+/// Mean and mean square of the heights by the amplitude, and mean square of their steps along s and t.
+struct Fingerprint {
+  std::array<double, 4> values{};
+
+  explicit Fingerprint(const LibraryRelief& relief) {
+    const auto size = static_cast<std::size_t>(relief.size);
+    const auto at = [&](std::size_t x, std::size_t y) {
+      return static_cast<double>(relief.heights[y % size * size + x % size]) / relief.amplitude;
+    };
+    for (std::size_t y = 0; y < size; ++y) {
+      for (std::size_t x = 0; x < size; ++x) {
+        const double height = at(x, y);
+        values[0] += height;
+        values[1] += height * height;
+        values[2] += std::pow(at(x + 1, y) - height, 2);
+        values[3] += std::pow(at(x, y + 1) - height, 2);
+      }
+    }
+    for (double& value : values) value /= static_cast<double>(size * size);
+  }
+};
+
+TEST(MesostructureLibrary, EachIsTheSameInEveryVersion) {
+  // A study that names a relief means this one. Whoever changes one gives it another name.
+  const std::map<std::string, std::array<double, 4>> known = {
+      {"ball-milled-steel", {0.357392, 0.181825, 0.076749, 0.033772}},
+      {"bark", {0.400890, 0.242867, 0.078927, 0.021874}},
+      {"basket", {0.850688, 0.734819, 0.010134, 0.010208}},
+      {"braille", {0.035617, 0.008013, 0.014497, 0.005199}},
+      {"bricks", {0.858872, 0.739716, 0.000807, 0.001553}},
+      {"brushed-steel", {0.509579, 0.284354, 0.002365, 0.051116}},
+      {"cobblestones", {0.454477, 0.320975, 0.089785, 0.089956}},
+      {"corduroy", {0.674288, 0.552573, 0.102663, 0.001996}},
+      {"denim", {0.793587, 0.646367, 0.036206, 0.017022}},
+      {"diamond-plate", {0.188361, 0.165459, 0.150609, 0.150630}},
+      {"file-teeth", {0.425444, 0.235239, 0.057090, 0.096962}},
+      {"fish-scales", {0.711110, 0.525904, 0.025371, 0.040438}},
+      {"hammered-copper", {0.339717, 0.156318, 0.014627, 0.014693}},
+      {"honeycomb", {0.358903, 0.306355, 0.208601, 0.202894}},
+      {"knit", {0.657966, 0.491676, 0.084105, 0.029304}},
+      {"knurled-metal", {0.377563, 0.212914, 0.071380, 0.026509}},
+      {"leather", {0.417755, 0.220452, 0.081550, 0.082437}},
+      {"linen", {0.750298, 0.583068, 0.030894, 0.031051}},
+      {"orange-peel", {0.671600, 0.476148, 0.031707, 0.031168}},
+      {"pebbles", {0.557230, 0.360649, 0.019983, 0.018899}},
+      {"record-groove", {0.706783, 0.667716, 0.002665, 0.502539}},
+      {"ribbed-rubber", {0.479402, 0.427968, 0.083953, 0.000022}},
+      {"ripple-sand", {0.424396, 0.268491, 0.093964, 0.016599}},
+      {"roughcast", {0.354815, 0.162441, 0.037256, 0.041518}},
+      {"sandpaper-p240", {0.346576, 0.184064, 0.080683, 0.077406}},
+      {"sandpaper-p80", {0.338859, 0.170919, 0.070759, 0.067759}},
+      {"stud-plate", {0.277387, 0.269924, 0.110238, 0.110260}},
+      {"tactile-paving", {0.281867, 0.112869, 0.035648, 0.035648}},
+      {"wood", {0.766376, 0.615951, 0.049671, 0.011719}},
+  };
+  for (const LibraryEntry& entry : mesostructure_library()) {
+    const auto found = known.find(entry.name);
+    if (found == known.end()) {
+      ADD_FAILURE() << entry.name << " is new: it belongs into the list";
+      continue;
+    }
+    const Fingerprint now(made(entry.name, 48));
+    for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(now.values[i], found->second[i], 2e-6) << entry.name << ' ' << i;
+  }
+  EXPECT_EQ(known.size(), mesostructure_library().size());
 }
 
 TEST(MesostructureLibrary, IsItsSeeds) {

@@ -1,5 +1,5 @@
-// Rows of heterogeneous-features-2008 on the paper's own scenes: Y-2, Y-3, Y-5, Y-6. Forces are compared with slopes of
-// potentials, spectra and counts that are made here.
+// Rows of heterogeneous-features-2008 on the paper's own scenes: Y-2, Y-3, Y-5, Y-6, Y-7. Forces are compared with
+// slopes of potentials, spectra and counts that are made here.
 
 #include <fmt/format.h>
 
@@ -483,6 +483,42 @@ TEST(Rows, Y6_TheVaseIsThreeTimesAsSteepAtItsNeck) {
   EXPECT_NEAR(literal[96].amplitude / literal[36].amplitude, 3.0, 3e-4);
   // The same work over the way that the probe has inside, 1 mm nearer to the axis: 3.22 : 1.
   EXPECT_NEAR(felt[96].amplitude / felt[36].amplitude, (widest - depth) / (widest / 3.0 - depth), 1e-3);
+}
+
+// ---- Y-7: the hand that sticks and slips ----
+
+TEST(Rows, Y7_TheHandSticksAndSlips) {
+  // Sticks to F_s, drops to k_d N at N = 0.6 N, and again.
+  const std::pair<const char*, double> scenes[] = {{"stick-slip", 0.4}, {"stick-slip-2", 0.6}};
+  for (const auto& [name, break_away] : scenes) {
+    const Experiment e = scene_of(builtin(name));
+    ASSERT_EQ(e.probe, ProbeKind::dynamic);
+    Result<SimulatedDevice> device = SimulatedDevice::build(e.path, e.device, e.hand, e.simulated);
+    Result<SafetyStage> safety = SafetyStage::build(SafetySettings::from_profile(e.device));
+    ASSERT_TRUE(device.ok() && safety.ok());
+    ProxyState state;
+    ProxyCache cache;
+    SessionSettings settings;
+    settings.dt = Seconds(1.0 / e.rate);
+    settings.max_ticks = 5000;
+    double most = 0.0;
+    double last = 0.0;
+    std::vector<double> after_drop;
+    const auto tick = [&](const ProbeSample& probe, Seconds dt) {
+      const ForceSample force = step(e.scene, state, cache, probe, dt);
+      const double friction = force.parts.friction.norm();
+      if (probe.time > e.path.contact_begin()) {
+        most = std::max(most, friction);
+        if (friction < last - 0.25 * break_away) after_drop.push_back(friction);
+      }
+      last = friction;
+      return force;
+    };
+    run_session(tick, *device, *safety, settings, [](const TraceRecord&) {});
+    ASSERT_GT(after_drop.size(), 3U) << name;
+    EXPECT_NEAR(most, break_away, 0.02 * break_away) << name;
+    for (const double friction : after_drop) EXPECT_NEAR(friction, 0.6 * break_away, 0.02 * break_away) << name;
+  }
 }
 
 }  // namespace

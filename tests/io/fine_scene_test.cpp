@@ -682,40 +682,6 @@ TEST_F(FineScene, ShorterGratingsPushHarder) {
   EXPECT_NEAR((narrow.second - narrow.first) / (wide.second - wide.first), 2.0, 0.02);
 }
 
-TEST_F(FineScene, TheHandSticksAndSlips) {
-  // Row Y-7: sticks to F_s, drops to k_d N at N = 0.6 N, and again.
-  const std::pair<const char*, double> scenes[] = {{"stick-slip", 0.4}, {"stick-slip-2", 0.6}};
-  for (const auto& [name, break_away] : scenes) {
-    const Experiment e = good(*builtin_scene_json(name));
-    ASSERT_EQ(e.probe, ProbeKind::dynamic);
-    Result<SimulatedDevice> device = SimulatedDevice::build(e.path, e.device, e.hand, e.simulated);
-    Result<SafetyStage> safety = SafetyStage::build(SafetySettings::from_profile(e.device));
-    ASSERT_TRUE(device.ok() && safety.ok());
-    ProxyState state;
-    ProxyCache cache;
-    SessionSettings settings;
-    settings.dt = Seconds(1.0 / e.rate);
-    settings.max_ticks = 5000;
-    double most = 0.0;
-    double last = 0.0;
-    std::vector<double> after_drop;
-    const auto tick = [&](const ProbeSample& probe, Seconds dt) {
-      const ForceSample force = step(e.scene, state, cache, probe, dt);
-      const double friction = force.parts.friction.norm();
-      if (probe.time > e.path.contact_begin()) {
-        most = std::max(most, friction);
-        if (friction < last - 0.25 * break_away) after_drop.push_back(friction);
-      }
-      last = friction;
-      return force;
-    };
-    run_session(tick, *device, *safety, settings, [](const TraceRecord&) {});
-    ASSERT_GT(after_drop.size(), 3U) << name;
-    EXPECT_NEAR(most, break_away, 0.02 * break_away) << name;
-    for (const double friction : after_drop) EXPECT_NEAR(friction, 0.6 * break_away, 0.02 * break_away) << name;
-  }
-}
-
 TEST_F(FineScene, TheLayIsFeltByDirection) {
   // Row Y-8: 0.6 N x 0.4 x (1 - angle / 90 degrees), in the middle of each stroke.
   const double expected[] = {0.24, 0.16, 0.08, 0.0};

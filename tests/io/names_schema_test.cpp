@@ -70,6 +70,7 @@ const std::map<std::string, Json>& expected() {
       {"law.formulation", names<Formulation>()},
       {"law.blend", names<Blend>()},
       {"law.magnitude", names<ContactMagnitude>()},
+      {"law.normal_map", names<NormalMapUse>()},
       {"blend_map.channel", names<Channel>()},
       {"material.friction", names<FrictionKind>()},
       {"friction.law", names<FrictionKind>()},

@@ -406,5 +406,43 @@ TEST(LuGre, LiteralBristleDampingGivesEnergyAndConsistentDoesNot) {
   EXPECT_GE(lowest, 0.0);
 }
 
+// --- a law that is changed while it is felt ---
+
+TEST(ChangedFriction, ASpringGoesOnWithItsForceOrItsEnergyWhicheverIsLess) {
+  for (const FrictionKind kind : {FrictionKind::implicit_coulomb, FrictionKind::karnopp}) {
+    for (const double factor : {0.25, 4.0}) {
+      FrictionLaw law = law_of(kind);
+      law.stiffness = 400.0;
+      FrictionRig rig = rig_of(law, 0.9, 0.8);
+      rig.drag(Vec3(1e-3, 0.0, 0.0), 0.5);  // 0.5 mm: 0.2 N of the 0.54 N that it can hold
+      ASSERT_NEAR(rig.energy(), 0.5 * 400.0 * 0.25e-6, 1e-9);
+      const double energy = rig.energy();
+      rig.law.stiffness = factor * 400.0;
+      const double force = -rig.move(Vec3(1e-12, 0.0, 0.0)).x();
+      if (factor > 1.0) {
+        EXPECT_NEAR(force, 0.2, 1e-6);
+        EXPECT_NEAR(rig.energy(), energy / factor, 1e-9);
+      } else {
+        EXPECT_NEAR(rig.energy(), energy, 1e-9);
+        EXPECT_NEAR(force, 0.2 * std::sqrt(factor), 1e-6);
+      }
+    }
+  }
+}
+
+TEST(ChangedFriction, ALawWithoutASpringForgetsTheStretch) {
+  for (const FrictionKind between : {FrictionKind::viscous, FrictionKind::coulomb}) {
+    FrictionLaw law = law_of(FrictionKind::karnopp);
+    law.stiffness = 400.0;
+    FrictionRig rig = rig_of(law, 0.9, 0.8);
+    rig.drag(Vec3(1e-3, 0.0, 0.0), 0.5);
+    rig.law = law_of(between);
+    rig.move(Vec3(1e-9, 0.0, 0.0));
+    EXPECT_EQ(rig.energy(), 0.0);
+    rig.law = law;
+    EXPECT_NEAR(-rig.move(Vec3(1e-6, 0.0, 0.0)).x(), 400.0 * 1e-6, 1e-6) << "not the 0.2 N of before";
+  }
+}
+
 }  // namespace
 }  // namespace asperity::friction_laws_test

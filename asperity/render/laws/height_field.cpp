@@ -52,7 +52,8 @@ LawForce literal_force(const HeightFieldLaw& law, const ReliefSurface& surface, 
     const Vec3 barycentric = frame.coordinates(probe);
     const double height =
         edge_taper(law.edge_taper, barycentric).factor * surface.coat_sample(face, barycentric, moment).height;
-    const double penetration = height - std::abs(frame.height(probe));
+    const double above = frame.height(probe);
+    const double penetration = height - (law.negative_heights ? above : std::abs(above));
     const bool deeper =
         penetration > answer.penetration || (penetration == answer.penetration && face < answer.element);
     if (penetration <= 0.0 || !deeper) return;
@@ -95,6 +96,9 @@ LawForce consistent_force(const HeightFieldLaw& law, const Touched& touch, doubl
 }  // namespace
 
 void HeightFieldLaw::options(std::vector<Option>& rows) {
+  rows.push_back(option("negative_heights", &HeightFieldLaw::negative_heights, OptionType::boolean(),
+                        "heights below 0 are met, as the 2005 paper's scratches are.")
+                     .of_printed_form("which meets them in any case"));
   rows.push_back(normal_map_option(&HeightFieldLaw::normal_map));
   rows.push_back(option("edge_taper", &HeightFieldLaw::edge_taper, OptionType::number({0.0, 1.0 / 3.0}),
                         "share of each triangle over which heights fall to 0 towards its edges; 0 turns it off.")

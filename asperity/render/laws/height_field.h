@@ -26,6 +26,8 @@ struct HeightFieldLaw {
   /// 2005. 0 turns it off. In 0 … 1/3.
   double edge_taper = formulation == Formulation::literal ? literal_taper : 0.0;
 
+  /// literal: the distance to the plane is signed, so that heights below 0 are met (2005, section 5: scratches).
+  bool negative_heights = false;
   NormalMapUse normal_map = NormalMapUse::automatic;  ///< consistent: whether it is felt
 
   static void options(std::vector<Option>& rows);
