@@ -228,6 +228,58 @@ TEST(Rows, Y2_APartialWrapIsRefusedUntilARangeSaysWhereItsSeamIs) {
   }
 }
 
+/// A ball of 40 mm under gratings, wrapped by a cylinder over a range of angles.
+std::string ranged(double wavelength, const char* range, const char* as) {
+  return fmt::format(
+      R"({{"surfaces":[{{"mesh":{{"generator":"icosphere","subdivisions":4,"radius":0.04}},"texture":{{"as":"{}",)"
+      R"("mapping":{{"surface":"cylinder","radius":"40 mm","range":{}}},)"
+      R"("features":{{"type":"grating","amplitude":"0.1 mm","wavelength":{:.17g}}}}}}}]}})",
+      as, range, wavelength);
+}
+
+TEST(Rows, Y2_ARangeIsReadAndItsSeamTold) {
+  const Experiment e = scene_of(ranged(1e-3, R"(["-30 deg","150 deg"])", "texture"));
+  const Vec2 range = first(e).fine->settings().mapping.settings().range.value();
+  EXPECT_NEAR(range.x(), -pi / 6.0, 1e-15);
+  EXPECT_NEAR(range.y(), pi * 5.0 / 6.0, 1e-15);
+  EXPECT_TRUE(has_note(e, "a seam 240 deg from the reference"));
+  EXPECT_EQ(scene_of(e.canonical_json).canonical_json, e.canonical_json);
+  // What happens to close does not step; and nothing is counted around that need not come back.
+  const std::string closes = ranged(0.08 * pi / 100.0, R"(["-30 deg","150 deg"])", "texture");
+  EXPECT_FALSE(has_note(scene_of(closes), "seam"));
+  const std::string count = closes.substr(0, closes.find(R"("wavelength")")) + R"("count":40}}}]})";
+  const Result<Experiment> counted = parse_experiment(count, {}, "scene.json");
+  ASSERT_FALSE(counted.ok());
+  EXPECT_EQ(counted.error().place, "surfaces[0].texture.features.count");
+}
+
+TEST(Rows, Y2_GeometryStepsAtTheSeamOfItsRangeAlone) {
+  // 3.25 waves around half of the ball: at the seam, opposite the middle of the range, 4.875 waves from its beginning
+  // meet 1.625 before it, 0.1 mm (cos 315 deg - cos 135 deg).
+  const double wavelength = 0.04 * pi / 3.25;
+  const Experiment e = scene_of(ranged(wavelength, R"(["-90 deg","90 deg"])", "geometry"));
+  EXPECT_TRUE(has_note(e, "a seam 180 deg from the reference: what lies there is felt as a step of up to 141 um"))
+      << ::testing::PrintToString(e.notes);
+  const auto& ball = *std::get<std::shared_ptr<const ReliefSurface>>(first(e).surface);
+  const MeshSurface& base = *base_of(first(e).surface);
+  SurfaceCache cache;
+  SurfaceCache bare;
+  int looked_at = 0;
+  for (int i = 0; i < 180; ++i) {
+    const double angle = 2.0 * pi * (i + 0.5) / 180.0 - pi;
+    // Within an edge of the seam a face may go on with the other side's pattern.
+    if (pi - std::abs(angle) < 0.12) continue;
+    const Vec3 out(std::cos(angle), 0.0, -std::sin(angle));
+    const Segment ray{0.05 * out, 0.03 * out};
+    const double outer = 0.05 - 0.02 * ball.view(cache).first_touch(ray, Sides::both).t;
+    const double inner = 0.05 - 0.02 * base.view(bare).first_touch(ray, Sides::both).t;
+    const double u = 0.04 * (angle + 0.5 * pi);
+    EXPECT_NEAR(outer - inner, 1e-4 * std::cos(2.0 * pi * u / wavelength), 1e-5) << angle;
+    ++looked_at;
+  }
+  EXPECT_GT(looked_at, 150);
+}
+
 // ---- Y-3: a smooth plane ----
 
 /// The force that is sent to the device, every tick of a session.

@@ -230,49 +230,6 @@ TEST_F(FineScene, WavesAreCountedAroundACylinder) {
   comes_back(noise);
 }
 
-TEST_F(FineScene, ARangeIsReadAndItsSeamTold) {
-  const char* half = R"("mapping":{"surface":"sphere","radius":"20 mm","range":["-30 deg","150 deg"]})";
-  const Experiment e = good(box(texture(millimetre, half)));
-  EXPECT_NEAR(fine(e).mapping.settings().range.value().x(), -pi / 6.0, 1e-15);
-  EXPECT_NEAR(fine(e).mapping.settings().range.value().y(), pi * 5.0 / 6.0, 1e-15);
-  EXPECT_TRUE(has_note(e, "a seam 240 deg from the reference"));
-  comes_back(e);
-  // Nothing comes back by itself, so nothing is counted around; what happens to close does not step.
-  refused(box(texture(R"({"type":"grating","amplitude":1e-4,"count":40})", half)), "texture.features.count");
-  EXPECT_FALSE(has_note(
-      good(box(texture(fmt::format(R"({{"type":"grating","amplitude":1e-4,"wavelength":{:.17g}}})", 0.04 * pi / 50.0),
-                       half))),
-      "seam"));
-}
-
-TEST_F(FineScene, GeometryStepsAtTheSeamOfItsRangeAlone) {
-  // 3.5 waves around half of a ball of 40 mm: at the seam, opposite the middle of the range, they miss by half a wave.
-  const double wavelength = 0.04 * pi / 3.5;
-  const Experiment e = good(
-      R"({"surfaces":[{"mesh":{"generator":"icosphere","subdivisions":4,"radius":0.04},)" +
-      texture(fmt::format(R"({{"type":"grating","amplitude":"0.1 mm","wavelength":{:.17g}}})", wavelength),
-              R"("mapping":{"surface":"cylinder","radius":"40 mm","range":["-90 deg","90 deg"]},"as":"geometry")") +
-      "}]}");
-  const auto& ball = *std::get<std::shared_ptr<const ReliefSurface>>(instance(e).surface);
-  const MeshSurface& base = *base_of(instance(e).surface);
-  SurfaceCache cache;
-  SurfaceCache bare;
-  int looked_at = 0;
-  for (int i = 0; i < 180; ++i) {
-    const double angle = 2.0 * pi * (i + 0.5) / 180.0 - pi;
-    // Within an edge of the seam a face may go on with the other side's pattern.
-    if (pi - std::abs(angle) < 0.12) continue;
-    const Vec3 out(std::cos(angle), 0.0, -std::sin(angle));
-    const Segment ray{0.05 * out, 0.03 * out};
-    const double outer = 0.05 - 0.02 * ball.view(cache).first_touch(ray, Sides::both).t;
-    const double inner = 0.05 - 0.02 * base.view(bare).first_touch(ray, Sides::both).t;
-    const double u = 0.04 * (angle + 0.5 * pi);
-    EXPECT_NEAR(outer - inner, 1e-4 * std::cos(2.0 * pi * u / wavelength), 1e-5) << angle;
-    ++looked_at;
-  }
-  EXPECT_GT(looked_at, 150);
-}
-
 TEST_F(FineScene, MappingsRefuseWhatIsWrong) {
   const auto mapping = [&](const std::string& members, const std::string& key, const std::string& part = {}) {
     refused(box(texture(millimetre, R"("mapping":{)" + members + "}")), "texture.mapping." + key, part);

@@ -192,6 +192,7 @@ RC_GTEST_PROP(ContactFriction, Amendment_7_consistent_friction_never_gives_energ
   FineSettings settings = fine_settings({});
   settings.lay.still_ratio = rng.uniform(0.0, 1.0);
   settings.lay.sliding_ratio = rng.uniform(0.0, settings.lay.still_ratio);
+  settings.lay.stiffness_ratio = rng.uniform(0.01, 1.0);
   settings.lay.direction = rng.uniform(0.0, 3.0);
   if (rng.uniform(0.0, 1.0) < 0.5) instance.fine = fine(settings);
   // Slow enough in the random walk that a spring held over a tick gains nothing worth telling.
