@@ -92,6 +92,8 @@ inline constexpr Host hosts[] = {
     {"law", "/surfaces/0/law",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"height-field"}}]})"},
     {"law", "/surfaces/0/law",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png"},"law":{"type":"height-field-literal"}}]})"},
+    {"law", "/surfaces/0/law",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":{"generator":"H_2"}},"law":{"type":"generated-geometry"}}]})"},
     {"surface", "/surfaces/0",
      R"({"surfaces":[{"volume":{"generator":"sphere","size":[8,8,8]},"iso":{"threshold":0}}]})"},

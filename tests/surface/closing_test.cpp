@@ -152,11 +152,16 @@ std::shared_ptr<const ReliefSurface> ringed_cup() {
                 must(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline)), Mapping::uv);
 }
 
-/// Of places of a surface farther than `radius` from its rim: the least share of `radius` that is free around the
-/// centre of a ball that touches.
-double least_freedom(const ReliefSurface& surface, double radius, std::uint64_t seed, int count) {
-  Rng rng(seed);
+/// Of `count` places of a surface farther than `radius` from its rim: the least share of `radius` that is free around
+/// the centre of a ball that touches, and how many were looked at and met.
+struct Freedom {
   double least = 1.0;
+  int places = 0;
+  int met = 0;
+};
+Freedom least_freedom(const ReliefSurface& surface, double radius, std::uint64_t seed, int count) {
+  Rng rng(seed);
+  Freedom freedom;
   SurfaceCache cache;
   for (int i = 0; i < count; ++i) {
     const std::uint32_t face = random_face(rng, surface.base().mesh());
@@ -165,22 +170,32 @@ double least_freedom(const ReliefSurface& surface, double radius, std::uint64_t 
     b /= b.sum();
     const ReliefPoint point = surface.point(surface.frame(face), b[1], b[2]);
     if (point.point.z() > -1.5 * radius) continue;
+    ++freedom.places;
     const Foot foot = surface.view(cache).nearest(point.point + radius * point.front, 1.01 * radius);
-    if (foot.found()) least = std::min(least, foot.distance / radius);
+    if (!foot.found()) continue;
+    ++freedom.met;
+    freedom.least = std::min(freedom.least, foot.distance / radius);
   }
-  return least;
+  return freedom;
 }
 
 TEST(T7_closing, outside_the_closed_cup_no_point_nearer_than_the_radius_has_two_feet) {
   // The ball that touches a place is free if and only if nothing between has a second foot.
   const double radius = 1.5e-3;
   const auto open = ringed_cup();
-  EXPECT_LT(least_freedom(*open, radius, 5, 150), 0.9) << "the open cup has such points";
+  const Freedom before = least_freedom(*open, radius, 5, 150);
+  EXPECT_LT(before.least, 0.9) << "the open cup has such points";
+  EXPECT_GE(before.places, 60);
   const Closed result = closed(open, radius, 40);
   EXPECT_GT(result.maps.report.changed_texels, 1000U);
   EXPECT_LE(result.maps.report.unsettled_texels * 500, result.maps.report.texels);
-  for (const double share : {0.3, 0.7, 0.95})
-    EXPECT_GT(least_freedom(result.surface, share * radius, 11, 100), 0.99) << share;
+  for (const double share : {0.3, 0.7, 0.95}) {
+    const Freedom after = least_freedom(result.surface, share * radius, 11, 150);
+    EXPECT_GT(after.least, 0.99) << share;
+    // The touched place itself is a foot: whoever is not met has not been looked at.
+    EXPECT_GE(after.places, 60) << share;
+    EXPECT_EQ(after.met, after.places) << share;
+  }
 }
 
 TEST(Closing, the_report_counts_what_the_picture_shows) {

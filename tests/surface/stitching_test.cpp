@@ -424,8 +424,8 @@ TEST(T8_gradients, of_the_height_are_tangent_to_the_surface) {
         const ReliefPoint point = surface->point(frame, at[1], at[2]);
         const FieldSample sample = surface->field(frame, {at[1], at[2], point.jet.height});
         ASSERT_LE(std::abs(sample.value), 1e-12);
-        ASSERT_LT(std::abs(sample.gradient.dot(point.along_u)) / point.along_u.norm(), 1e-9);
-        ASSERT_LT(std::abs(sample.gradient.dot(point.along_v)) / point.along_v.norm(), 1e-9);
+        ASSERT_LT(std::abs(sample.gradient.dot(point.along_u)) / point.along_u.norm(), 1e-12);
+        ASSERT_LT(std::abs(sample.gradient.dot(point.along_v)) / point.along_v.norm(), 1e-12);
         ASSERT_GT(sample.gradient.dot(point.front), 0.0);
       }
     }
