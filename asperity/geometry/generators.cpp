@@ -411,9 +411,45 @@ MeshSource trial_mesh_a(const TrialMeshSettings& settings) {
   return source;
 }
 
-MeshSource trial_mesh_b(double largest_fold, const TrialMeshSettings& settings) {
+namespace {
+
+/// Bends the unit lattice along its rows: row after row stands where the profile (y, z) says.
+void lay_along(MeshSource& lattice, const TrialMeshSettings& settings, const std::vector<Vec2>& profile) {
+  const Vec2 middle(0.5 * (profile.front().x() + profile.back().x()), 0.0);
+  const std::size_t stride = static_cast<std::size_t>(settings.columns) + 1;
+  for (std::size_t i = 0; i < lattice.positions.size(); ++i) {
+    Vec3& position = lattice.positions[i];
+    const Vec2 row = profile[i / stride] - middle;
+    position = settings.mean_edge * Vec3(position.x(), row.x(), row.y());
+  }
+}
+
+/// Height of a strip of the unit lattice.
+const double strip = std::sqrt(3.0) / 2.0;
+
+std::vector<Vec2> arch_profile(double largest_fold, int rows) {
+  const int middle = rows / 2;
+  const auto fold = [&](int row) { return rows > 1 ? largest_fold * std::exp2(-std::abs(row - middle)) : 0.0; };
+  double turn = 0.0;
+  for (int row = 1; row < rows; ++row) turn += fold(row);
+  std::vector<Vec2> profile = {Vec2::Zero()};
+  double slope = 0.5 * turn;
+  for (int row = 1; row <= rows; ++row) {
+    profile.push_back(profile.back() + strip * Vec2(std::cos(slope), std::sin(slope)));
+    slope -= fold(row);
+  }
+  return profile;
+}
+
+}  // namespace
+
+MeshSource trial_mesh_b(double largest_fold, const TrialMeshSettings& settings, TrialBend bend) {
   const TrialMeshSettings used = checked(settings);
   MeshSource source = unit_lattice(used);
+  if (bend == TrialBend::arch) {
+    lay_along(source, used, arch_profile(within(largest_fold, 1e-3, std::numbers::pi / 4.0), used.rows));
+    return source;
+  }
   // A face's normal points to the centre, on the sphere, of its circumcircle's image. For two unit triangles beside an
   // edge at the pole these centres are fold = 2 (atan(sqrt(3) x) - atan(x / sqrt(3))) apart, with x = 1 / (4 radius).
   const double t = std::tan(0.5 * within(largest_fold, 1e-3, std::numbers::pi / 4.0));
@@ -433,20 +469,13 @@ MeshSource trial_mesh_c(const TrialMeshSettings& settings, std::span<const doubl
   constexpr double pi = std::numbers::pi;
   constexpr std::array<double, 3> papers = {pi / 3.0, pi / 2.0, 2.0 * pi / 3.0};
   if (ridge_angles.empty()) ridge_angles = papers;
-  const double height = std::sqrt(3.0) / 2.0;
   std::vector<Vec2> profile = {Vec2::Zero()};  // y and z of each row
   for (std::size_t j = 0; j < static_cast<std::size_t>(used.rows); ++j) {
     const double ridge = within(ridge_angles[j / 2 % ridge_angles.size()], pi / 18.0, pi);
     const double slope = (j % 2 == 0 ? 0.5 : -0.5) * (pi - ridge);
-    profile.push_back(profile.back() + height * Vec2(std::cos(slope), std::sin(slope)));
+    profile.push_back(profile.back() + strip * Vec2(std::cos(slope), std::sin(slope)));
   }
-  const double middle = 0.5 * profile.back().x();
-  const std::size_t stride = static_cast<std::size_t>(used.columns) + 1;
-  for (std::size_t i = 0; i < source.positions.size(); ++i) {
-    Vec3& position = source.positions[i];
-    const Vec2& row = profile[i / stride];
-    position = used.mean_edge * Vec3(position.x(), row.x() - middle, row.y());
-  }
+  lay_along(source, used, profile);
   return source;
 }
 

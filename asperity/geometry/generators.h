@@ -10,6 +10,7 @@
 #include <numbers>
 #include <span>
 
+#include "asperity/core/names.h"
 #include "asperity/geometry/mesh.h"
 
 namespace asperity {
@@ -43,12 +44,28 @@ struct TrialMeshSettings {
 /// origin. Every other vertex row is shifted by half an edge. UVs run once over the bounding rectangle. [build]
 MeshSource trial_mesh_a(const TrialMeshSettings& settings = {});
 
-/// M_b (hrm-2010, Table 1): M_a laid on a sphere, softly convex. Folds are exterior angles, measured through the
-/// solid: 180 degrees is flat, 225 a bend of 45. Every inner edge folds by more than 180 and at most 180 degrees +
-/// `largest_fold`, largest in the middle. The lattice is laid on by inverse stereographic projection, which keeps
-/// circles and so keeps the triangles near equilateral and the (Delaunay) mesh convex.
+/// How M_b is bent.
+///   dome  along every edge: laid on a sphere. Folds of 45 degrees are an icosahedron's: beyond a few triangles they
+///   close
+///         around it
+///   arch  along the rows: the triangles stay M_a's own, edges within a strip stay flat, and the largest fold still
+///   leaves
+///         an open sheet of any size
+enum class TrialBend { dome, arch };
+/// As in scene files.
+template <>
+struct Names<TrialBend> {
+  static constexpr auto table = std::to_array<Named<TrialBend>>({{TrialBend::dome, "dome"}, {TrialBend::arch, "arch"}});
+};
+
+/// M_b (hrm-2010, Table 1): M_a as a softly convex surface. Folds are exterior angles, measured through the solid: 180
+/// degrees is flat, 225 a bend of 45. Every inner edge folds by 180 to 180 degrees + `largest_fold`, largest in the
+/// middle. A dome's lattice is laid on a sphere by inverse stereographic projection, which keeps circles and so keeps
+/// the triangles near equilateral and the (Delaunay) mesh convex; all its folds are more than 180 degrees. An arch's
+/// folds halve from one row to the next on both sides of the middle one.
 /// `largest_fold` 1e-3 to pi/4. UVs those of M_a. [build]
-MeshSource trial_mesh_b(double largest_fold = std::numbers::pi / 30.0, const TrialMeshSettings& settings = {});
+MeshSource trial_mesh_b(double largest_fold = std::numbers::pi / 30.0, const TrialMeshSettings& settings = {},
+                        TrialBend bend = TrialBend::dome);
 
 /// M_c (hrm-2010, Table 1): M_a folded along its rows into a corrugated sheet that never overhangs. `ridge_angles` are
 /// the angles between the two faces at the ridges, in turn, pi/18 to pi each; none: 60, 90, 120 degrees (acute, square,
@@ -87,7 +104,7 @@ MeshSource displaced_mesh(const TriangleMesh& base, int subdivisions, const Heig
 inline constexpr std::size_t most_displaced_triangles = 4'194'304;
 
 /// M_G (hrm-2010, Table 1): M_b with small triangles that follow a height field in place of its coat; `height` is over
-/// the faces of trial_mesh_b(largest_fold, settings). [build]
+/// the faces of trial_mesh_b(largest_fold, settings), a dome; displaced_mesh makes one of an arch. [build]
 MeshSource trial_mesh_g(int subdivisions, const HeightOverFace& height, double largest_fold = std::numbers::pi / 30.0,
                         const TrialMeshSettings& settings = {});
 

@@ -50,7 +50,7 @@ class GeneratorReader {
   }
   MeshSource trial_b() {
     const TrialMeshSettings settings = trial_settings();
-    return trial_mesh_b(number("largest_fold"), settings);
+    return trial_mesh_b(number("largest_fold"), settings, reader_.get<TrialBend>("bend"));
   }
   MeshSource trial_c() {
     const TrialMeshSettings settings = trial_settings();
@@ -61,6 +61,7 @@ class GeneratorReader {
   MeshSource displaced() {
     const TrialMeshSettings settings = trial_settings();
     const double fold = number("largest_fold");
+    const auto bend = reader_.get<TrialBend>("bend");
     const int subdivisions = whole("subdivisions");
     const auto columns = static_cast<double>(settings.columns);
     const double triangles = 2.0 * columns * settings.rows * std::exp2(2.0 * subdivisions);
@@ -69,8 +70,8 @@ class GeneratorReader {
                    fmt::format("at most {} triangles", most_displaced_triangles), ErrorCode::too_large);
     }
     if (reader_.failed()) return {};
-    return reader_.value_or(displaced_by(*reader_.raw("mesostructure"), trial_mesh_b(fold, settings), subdivisions),
-                            {});
+    const MeshSource base = trial_mesh_b(fold, settings, bend);
+    return reader_.value_or(displaced_by(*reader_.raw("mesostructure"), base, subdivisions), {});
   }
 
   Result<MeshSource> displaced_by(const SceneJson& relief, MeshSource source, int subdivisions) {

@@ -13,7 +13,8 @@ namespace {
 const char* const generated_heights_why = "for a generated height map";
 
 void filter(SceneObject& row) {
-  row("filter", Type::named<Reconstruction>(), "Between texels: steps, bilinear, or a C1 quadratic B-spline.",
+  row("filter", Type::named<Reconstruction>(),
+      "Between texels: steps, bilinear, or through every texel a C1 quadratic or C2 cubic (bicubic) B-spline.",
       with_default(Reconstruction::quadratic_bspline));
 }
 
@@ -145,7 +146,7 @@ void height_generator(SceneObject& row) {
      "tile.",
      or_else("H_2: 1/3; H_6: 0.08"));
   of("flank", share(0.25),
-     "Width of each edge, share of the tile. H_5: to half of the narrowest rim; H_6: to half of width.",
+     "Width of each edge, share of the tile. H_5: to half of the narrowest rim or flat coin; H_6: to half of width.",
      or_else("H_5: 0, a vertical edge of one texel; H_6: a quarter of width"));
   of("radius", ratio(radii), "Of both bows of the S, share of the tile, 0.05 to 0.24 less a quarter of width.",
      only_if(Test::is("generator", {"H_6", "groove", "h6"}), "by this generator"), with_default(0.16));
@@ -154,8 +155,11 @@ void height_generator(SceneObject& row) {
                                   .saying("a share of the tile from 0.001 to 0.25, or two [smallest, largest]")}),
      "Smallest and largest radius, or one for all, shares of the tile.",
      or_else("H_4: [0.015, 0.06]; H_5: [0.09, 0.15]"));
-  of("rim", share(0.5), "H_5: width of the rim, share of the radius, 0.02 or more.", with_default(0.12));
-  of("field", share(1.0), "H_5: height of the field inside the rim, share of the rim's height.", with_default(0.6));
+  of("rim", share(0.5), "H_5: width of the rim around a \"field\" below 1, share of the radius, 0.02 or more.",
+     or_else("0.12; flat coins have none"));
+  of("field", share(1.0),
+     "H_5: height of the field inside a rim, with a cross on it, share of the rim's height; 1: a flat cylinder.",
+     with_default(1.0));
   of("overlap", share(0.9), "H_5: how far two coins may overlap, share of the sum of their radii.", with_default(0.2));
   of("hurst", Type::number({0.05, 1.0}), "H_7: Hurst exponent, from rugged to smooth.", with_default(0.8));
   of("octaves", Type::integer(1, 12),

@@ -169,6 +169,10 @@ void mesh_generator(SceneObject& row) {
      only_if(Test::without("triangles"), "beside triangles"), with_default(1));
   of("largest_fold", angle({1e-3, std::numbers::pi / 4.0}), "Largest fold between faces beyond flat.", {"M_b", "M_G"},
      with_default(std::numbers::pi / 30.0));
+  of("bend", Type::named<TrialBend>(),
+     "dome: along every edge, laid on a sphere, which folds of 45 degrees close around. arch: along the rows, flat "
+     "within a strip.",
+     {"M_b", "M_G"}, with_default(TrialBend::dome));
   of("fold_angles",
      Type::array(angle({10.0 * degree, 180.0 * degree}), 1, 1000, "angles")
          .saying("1 to 1000 angles, 10 to 180 degrees each (rad, or \"60 deg\")"),

@@ -195,7 +195,7 @@ void add_difference_place(const HeightMap& map, const Vec2& pitch, int x, int y,
 void take_range(const HeightMap& map, ReliefShape& shape) {
   shape.lowest = map.lowest();
   shape.highest = map.highest();
-  if (map.reconstruction() != Reconstruction::quadratic_bspline) return;
+  if (!is_spline(map.reconstruction())) return;
   // The map's own bounds are those of its coefficients, wider than what is reached: two samples a texel come closer.
   const double reach_low = shape.lowest;
   const double reach_high = shape.highest;
@@ -376,7 +376,7 @@ ReliefShape measure_shape(const HeightMap& map, const Vec2& tile) {
   }
   shape.wave = main_wave(map, pitch);
   BendStatistics statistics;
-  const bool spline = map.reconstruction() == Reconstruction::quadratic_bspline;
+  const bool spline = is_spline(map.reconstruction());
   for (int y = 0; y < map.height(); y += stride_for(map.height())) {
     for (int x = 0; x < map.width(); x += stride_for(map.width())) {
       if (spline) {
@@ -398,7 +398,7 @@ ReliefShape measure_shape(const TriangleMesh& mesh, const Coat& coat) {
     shape.lowest = coat.lowest();
     shape.highest = coat.highest();
   }
-  if (coat.maps().heights().reconstruction() == Reconstruction::quadratic_bspline) measure_on_faces(mesh, coat, shape);
+  if (is_spline(coat.maps().heights().reconstruction())) measure_on_faces(mesh, coat, shape);
   return shape;
 }
 

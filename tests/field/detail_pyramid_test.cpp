@@ -18,7 +18,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr Reconstruction all_reconstructions[] = {Reconstruction::nearest, Reconstruction::bilinear,
-                                                  Reconstruction::quadratic_bspline};
+                                                  Reconstruction::quadratic_bspline, Reconstruction::bicubic};
 
 HeightMap map_of(std::vector<float> heights, int width, int height, Wrap wrap, Reconstruction reconstruction) {
   auto map = HeightMap::build(std::move(heights), width, height, wrap, reconstruction);

@@ -16,7 +16,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr Reconstruction all_reconstructions[] = {Reconstruction::nearest, Reconstruction::bilinear,
-                                                  Reconstruction::quadratic_bspline};
+                                                  Reconstruction::quadratic_bspline, Reconstruction::bicubic};
 constexpr Wrap both_wraps[] = {Wrap::repeat, Wrap::clamp};
 
 static_assert(noexcept(std::declval<const HeightMap&>().sample(std::declval<const Vec2&>())));
@@ -62,14 +62,17 @@ TEST_P(Ramp, IsReproducedWithItsGradientAwayFromTheBorder) {
   const HeightMap map = map_of(tabulate(size, size, ramp), size, size, Wrap::clamp, GetParam());
   Rng rng(1);
   for (int i = 0; i < 2000; ++i) {
-    // The mirrored border's influence falls by 5.8 a texel: 16 texels inside it is under 1e-12.
+    // The mirrored border's influence falls by 5.8 a texel, the cubic spline's by 3.7: 16 texels inside it is under
+    // 1e-9.
     const Vec2 st(rng.uniform(0.25, 0.75), rng.uniform(0.25, 0.75));
     const HeightSample sample = map.sample(st);
     ASSERT_NEAR(sample.height, ramp(st.x(), st.y()), 1e-6 * 5e-3);
     ASSERT_NEAR((sample.gradient - slope).norm(), 0.0, 1e-4 * slope.norm());
   }
 }
-INSTANTIATE_TEST_SUITE_P(Smooth, Ramp, testing::Values(Reconstruction::bilinear, Reconstruction::quadratic_bspline));
+INSTANTIATE_TEST_SUITE_P(Smooth, Ramp,
+                         testing::Values(Reconstruction::bilinear, Reconstruction::quadratic_bspline,
+                                         Reconstruction::bicubic));
 
 struct Errors {
   double height = 0.0;
@@ -101,6 +104,15 @@ TEST(HeightMapCosine, BsplineConvergesWithThirdOrderHeightsAndSecondOrderGradien
   EXPECT_LT(fine.gradient, 0.02 * 4.0 * pi);
 }
 
+TEST(HeightMapCosine, BicubicConvergesWithFourthOrderHeightsAndThirdOrderGradients) {
+  const Errors coarse = cosine_errors(16, Reconstruction::bicubic);
+  const Errors fine = cosine_errors(32, Reconstruction::bicubic);
+  EXPECT_GT(coarse.height / fine.height, 16.0 * 0.8);
+  EXPECT_GT(coarse.gradient / fine.gradient, 8.0 * 0.8);
+  EXPECT_LT(fine.height, cosine_errors(32, Reconstruction::quadratic_bspline).height);
+  EXPECT_LT(fine.gradient, 0.3 * cosine_errors(32, Reconstruction::quadratic_bspline).gradient);
+}
+
 TEST(HeightMapCosine, BilinearConvergesWithSecondOrderHeightsAndFirstOrderGradients) {
   const Errors coarse = cosine_errors(32, Reconstruction::bilinear);
   const Errors fine = cosine_errors(64, Reconstruction::bilinear);
@@ -108,11 +120,10 @@ TEST(HeightMapCosine, BilinearConvergesWithSecondOrderHeightsAndFirstOrderGradie
   EXPECT_NEAR(coarse.gradient / fine.gradient, 2.0, 0.4);
 }
 
-/// Largest error of the spline's second derivatives.
-double cosine_curvature_error(int size) {
+/// Largest error of a spline's second derivatives.
+double cosine_curvature_error(int size, Reconstruction reconstruction) {
   const auto relief = [](double s, double t) { return std::cos(4.0 * pi * s) * std::cos(2.0 * pi * t); };
-  const HeightMap map =
-      map_of(tabulate(size, size, relief), size, size, Wrap::repeat, Reconstruction::quadratic_bspline);
+  const HeightMap map = map_of(tabulate(size, size, relief), size, size, Wrap::repeat, reconstruction);
   Rng rng(3);
   double error = 0.0;
   for (int i = 0; i < 20000; ++i) {
@@ -127,10 +138,17 @@ double cosine_curvature_error(int size) {
 }
 
 TEST(HeightMapCosine, BsplineConvergesWithFirstOrderSecondDerivatives) {
-  const double fine = cosine_curvature_error(128);
-  EXPECT_NEAR(cosine_curvature_error(64) / fine, 2.0, 0.2);
+  const double fine = cosine_curvature_error(128, Reconstruction::quadratic_bspline);
+  EXPECT_NEAR(cosine_curvature_error(64, Reconstruction::quadratic_bspline) / fine, 2.0, 0.2);
   // Half a texel of the third derivative.
   EXPECT_NEAR(fine, std::pow(4.0 * pi, 3) * 0.5 / 128, 0.1 * fine);
+}
+
+TEST(HeightMapCosine, BicubicConvergesWithSecondOrderSecondDerivatives) {
+  const double fine = cosine_curvature_error(64, Reconstruction::bicubic);
+  EXPECT_NEAR(cosine_curvature_error(32, Reconstruction::bicubic) / fine, 4.0, 0.4);
+  // At a texel's centre it is that of the samples: a twelfth of the fourth derivative.
+  EXPECT_NEAR(fine, std::pow(4.0 * pi, 4) / (12.0 * 64 * 64), 0.25 * fine);
 }
 
 TEST(HeightMapStep, BsplineOvershootsByTenPercentAndTheBoundsSaySo) {  // formulation amendment 11
@@ -142,6 +160,19 @@ TEST(HeightMapStep, BsplineOvershootsByTenPercentAndTheBoundsSaySo) {  // formul
   EXPECT_NEAR(highest, 1.10, 0.02);
   EXPECT_GE(map.highest(), highest);
   EXPECT_LE(map.highest(), 1.17);  // its own coefficients reach 1.21
+  EXPECT_NEAR(map.highest() + map.lowest(), 1.0, 1e-6);
+}
+
+TEST(HeightMapStep, BicubicPassesThroughTheTexelsBesideTheStepAndTheBoundsHold) {
+  const int size = 64;
+  const HeightMap map = map_of(tabulate(size, 2, [](double s, double) { return s < 0.5 ? 0.0 : 1.0; }), size, 2,
+                               Wrap::clamp, Reconstruction::bicubic);
+  double highest = -infinity;
+  for (int i = 0; i <= 20000; ++i) highest = std::max(highest, map.height_at({i / 20000.0, 0.5}));
+  EXPECT_NEAR(map.height_at({33.5 / size, 0.5}), 1.0, 1e-6);
+  EXPECT_NEAR(highest, 1.11, 0.005);
+  EXPECT_GE(map.highest(), highest);
+  EXPECT_LE(map.highest(), highest + 0.04);  // its own coefficients reach 1 + 1 / (1 + sqrt 3) = 1.37
   EXPECT_NEAR(map.highest() + map.lowest(), 1.0, 1e-6);
 }
 
@@ -226,13 +257,33 @@ TEST(HeightMapContinuity, BsplineGradientIsContinuousAcrossTexelsSeamsAndBorders
   }
 }
 
+TEST(HeightMapContinuity, BicubicCurvatureIsContinuousAcrossTexelsAndSeams) {
+  const HeightMap map = map_of(random_heights(16, 12, 5), 16, 12, Wrap::repeat, Reconstruction::bicubic);
+  const auto jump = [&](double step) {
+    double largest = 0.0;
+    for (int i = -1; i <= 33; ++i) {
+      for (int j = 0; j < 40; ++j) {
+        const Vec2 half(0.25 * step / 16.0, 0.25 * step / 12.0);
+        const Vec2 st(0.5 * i / 16.0, j / 37.0);
+        const HeightCurvature after = map.curvature(st + half);
+        const HeightCurvature before = map.curvature(st - half);
+        largest = std::max(
+            {largest, std::abs(after.ss - before.ss), std::abs(after.st - before.st), std::abs(after.tt - before.tt)});
+      }
+    }
+    return largest;
+  };
+  EXPECT_NEAR(jump(1e-3) / jump(1e-4), 10.0, 1.0);
+}
+
 TEST(HeightMapContinuity, BilinearGradientJumpsAtTexelCentres) {
   const HeightMap map = map_of(random_heights(16, 12, 5), 16, 12, Wrap::repeat, Reconstruction::bilinear);
   EXPECT_NEAR(gradient_jump(map, 1e-3, 0.5) / gradient_jump(map, 1e-4, 0.5), 1.0, 0.1);
 }
 
 TEST(HeightMapContinuity, HeightsAreContinuousAcrossTheSeam) {
-  for (const Reconstruction reconstruction : {Reconstruction::bilinear, Reconstruction::quadratic_bspline}) {
+  for (const Reconstruction reconstruction :
+       {Reconstruction::bilinear, Reconstruction::quadratic_bspline, Reconstruction::bicubic}) {
     const HeightMap map = map_of(random_heights(11, 9, 6), 11, 9, Wrap::repeat, reconstruction);
     for (int j = 0; j < 50; ++j) {
       const double along = j / 50.0;
@@ -247,7 +298,8 @@ RC_GTEST_PROP(HeightMapGradient, AgreesWithFiniteDifferences, ()) {
   const int width = *rc::gen::inRange(1, 20);
   const int height = *rc::gen::inRange(1, 20);
   const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
-  const Reconstruction reconstruction = *rc::gen::element(Reconstruction::bilinear, Reconstruction::quadratic_bspline);
+  const Reconstruction reconstruction =
+      *rc::gen::element(Reconstruction::bilinear, Reconstruction::quadratic_bspline, Reconstruction::bicubic);
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
   const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
   const double step = 1e-4;  // texels
@@ -265,9 +317,10 @@ RC_GTEST_PROP(HeightMapGradient, AgreesWithFiniteDifferences, ()) {
       before[axis] -= step / counts[axis];
       after[axis] += step / counts[axis];
       const double difference = (map.height_at(after) - map.height_at(before)) * counts[axis] / (2.0 * step);
-      // Between creases the difference quotient is exact for both (piecewise linear or quadratic along an axis); what
-      // is left is rounding.
-      RC_ASSERT(std::abs(difference - gradient[axis]) <= 1e-8 * 1e-3 * counts[axis]);
+      // Between creases the difference quotient is exact for the first two (piecewise linear or quadratic along an
+      // axis); what is left is rounding, and a sixth of a third derivative of the cubic one.
+      const double left = reconstruction == Reconstruction::bicubic ? 2e-7 : 1e-8;
+      RC_ASSERT(std::abs(difference - gradient[axis]) <= left * 1e-3 * counts[axis]);
     }
   }
 }
@@ -317,9 +370,13 @@ RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) 
       *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
   const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
-  // Pieces of the spline meet on the texels' borders, those of the other two at least on the lines through centres.
+  // Pieces of the quadratic spline meet on the texels' borders, those of the others at least on the lines through
+  // centres.
   const double piece = reconstruction == Reconstruction::quadratic_bspline ? 0.0 : 0.5;
-  const Vec2 step(0.05 / width, 0.05 / height);
+  // In a piece of the cubic one the mixed derivative is quadratic across: a short step leaves little of that.
+  const bool cubic = reconstruction == Reconstruction::bicubic;
+  const Vec2 step = Vec2(1.0 / width, 1.0 / height) * (cubic ? 1e-3 : 0.05);
+  const double left = cubic ? 1e-4 : 1e-9;
   for (int i = 0; i < 20; ++i) {
     const auto inside_a_piece = [&](int count) {
       const double half = piece > 0.0 ? 0.25 * static_cast<double>(rng.below(2)) : 0.0;  // nearest: not on a border
@@ -335,10 +392,10 @@ RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) 
         (2.0 * step.y());
     const HeightCurvature curvature = map.curvature(st);
     // Within a piece the gradient is at most quadratic along an axis, so the quotient is exact but for rounding.
-    RC_ASSERT(std::abs(curvature.ss - along_s.x()) <= 1e-9 * 1e-3 * width * width);
-    RC_ASSERT(std::abs(curvature.st - along_s.y()) <= 1e-9 * 1e-3 * width * height);
-    RC_ASSERT(std::abs(curvature.st - along_t.x()) <= 1e-9 * 1e-3 * width * height);
-    RC_ASSERT(std::abs(curvature.tt - along_t.y()) <= 1e-9 * 1e-3 * height * height);
+    RC_ASSERT(std::abs(curvature.ss - along_s.x()) <= left * 1e-3 * width * width);
+    RC_ASSERT(std::abs(curvature.st - along_s.y()) <= left * 1e-3 * width * height);
+    RC_ASSERT(std::abs(curvature.st - along_t.x()) <= left * 1e-3 * width * height);
+    RC_ASSERT(std::abs(curvature.tt - along_t.y()) <= left * 1e-3 * height * height);
   }
 }
 
@@ -420,7 +477,7 @@ TEST(HeightMapBounds, HoldEverySampleAndAreNotWide) {
       EXPECT_GE(low, map.lowest());
       EXPECT_LE(high, map.highest());
       // Noise from texel to texel is the worst case for a spline's bounds.
-      const double widest = reconstruction == Reconstruction::quadratic_bspline ? 1.4 : 1.05;
+      const double widest = is_spline(reconstruction) ? 1.4 : 1.05;
       EXPECT_LE(map.highest() - map.lowest(), widest * (high - low));
     }
   }

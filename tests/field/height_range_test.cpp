@@ -19,7 +19,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr Reconstruction all_reconstructions[] = {Reconstruction::nearest, Reconstruction::bilinear,
-                                                  Reconstruction::quadratic_bspline};
+                                                  Reconstruction::quadratic_bspline, Reconstruction::bicubic};
 constexpr Wrap both_wraps[] = {Wrap::repeat, Wrap::clamp};
 
 static_assert(noexcept(std::declval<const HeightMap&>().range_over(std::declval<const Vec2&>(),

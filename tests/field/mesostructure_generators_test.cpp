@@ -243,7 +243,29 @@ double tiled_distance(const Vec2& a, const Vec2& b) {
   return (apart - Vec2(std::round(apart.x()), std::round(apart.y()))).norm();
 }
 
-TEST(CoinHeights, H_5_IsARaisedRimAroundAFlatFieldWithACross) {
+TEST(CoinHeights, H_5_IsARaisedFlatCylinder) {
+  const int size = 512;
+  const double texel = 1.0 / size;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+    const std::vector<float> heights = made({.kind = MesostructureKind::coins,
+                                             .size = size,
+                                             .amplitude = amplitude,
+                                             .seed = seed,
+                                             .number = 1,
+                                             .radius = ShareRange{0.2, 0.2}});
+    const CoinOutline coin = outline_of(heights, size);
+    EXPECT_NEAR(coin.radius, 0.2, texel);
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const double d = tiled_distance({(x + 0.5) / size, (size - y - 0.5) / size}, coin.centre);
+        if (std::abs(d - 0.2) <= texel) continue;
+        ASSERT_EQ(at(heights, size, x, y), d < 0.2 ? static_cast<float>(amplitude) : 0.0F) << x << " " << y;
+      }
+    }
+  }
+}
+
+TEST(CoinHeights, H_5_WithALowerFieldIsARaisedRimAroundItWithACross) {
   const int size = 512;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     const MesostructureSpec spec{.kind = MesostructureKind::coins,
@@ -307,7 +329,7 @@ TEST(CoinHeights, H_5_CountRadiiOverlapAndFlankActAsStated) {
   const MesostructureSpec crowd{.seed = 2, .number = 30, .radius = ShareRange{0.08, 0.08}, .overlap = 0.6};
   EXPECT_LT(groups(coins(crowd), size, raised), 30);
   // A flank of 6 texels rises in steps: no neighbours differ by more than pi / 2 of a sixth.
-  const MesostructureSpec gentle{.number = 3, .flank = 6.0 / size, .radius = ShareRange{0.12, 0.12}, .rim = 0.3};
+  const MesostructureSpec gentle{.number = 3, .flank = 6.0 / size, .radius = ShareRange{0.12, 0.12}};
   EXPECT_EQ(largest_step(coins({.number = 3}), size, false), static_cast<float>(amplitude));
   EXPECT_LT(largest_step(coins(gentle), size, false), 1.6 / 6.0 * amplitude);
   EXPECT_NEAR(highest(coins(gentle)), amplitude, 1e-9);
@@ -495,6 +517,7 @@ TEST(GeneratedHeights, ParametersOfAKindAreThoseThatChangeIt) {
       MesostructureSpec plain{.kind = kind, .size = 128};
       if (kind == rings && name == "seed") plain.number = spec.number = 4;
       if (kind == coins && name == "overlap") plain.number = spec.number = 12;
+      if (kind == coins && name == "rim") plain.field = spec.field = 0.5;
       const bool takes = std::find(taken.begin(), taken.end(), name) != taken.end();
       EXPECT_EQ(made(spec) != made(plain), takes) << paper_name(kind) << " " << name;
     }
@@ -575,7 +598,8 @@ TEST(GeneratedHeights, BadSpecificationsAreRefusedByName) {
   EXPECT_EQ(refused({.kind = warts, .size = 64, .radius = ShareRange{0.0, 0.1}}), "radius");
   EXPECT_EQ(refused({.kind = warts, .size = 64, .radius = ShareRange{0.1, 0.05}}), "radius");
   EXPECT_EQ(refused({.kind = coins, .size = 64, .number = 100, .overlap = 0.0}), "number");  // no room
-  EXPECT_EQ(refused({.kind = coins, .size = 64, .rim = 0.6}), "rim");
+  EXPECT_EQ(refused({.kind = coins, .size = 64, .rim = 0.6, .field = 0.5}), "rim");
+  EXPECT_EQ(refused({.kind = coins, .size = 64, .rim = 0.2}), "rim");
   EXPECT_EQ(refused({.kind = coins, .size = 64, .field = 1.5}), "field");
   EXPECT_EQ(refused({.kind = coins, .size = 64, .overlap = 1.0}), "overlap");
   EXPECT_EQ(refused({.kind = coins, .size = 64, .flank = 0.1}), "flank");  // wider than half the rim

@@ -115,6 +115,31 @@ TEST(Generators, MbFoldsBetween180And225DegreesAndStaysNearEquilateral) {
   }
 }
 
+TEST(Generators, MbAsAnArchIsMaWithFoldsOf180To225Degrees) {
+  for (const int rows : {1, 2, 7, 8, 300}) {
+    const TriangleMesh mesh = built(trial_mesh_b(45.0 * degree, {3, rows, 0.02}, TrialBend::arch));
+    expect_clean(mesh);
+    EXPECT_FALSE(mesh.report().closed());
+    EXPECT_NEAR(mesh.report().min_edge, 0.02, 1e-12);
+    EXPECT_NEAR(mesh.report().max_edge, 0.02, 1e-12);
+    EXPECT_NEAR(mesh.bounds().centre().y(), 0.0, 0.02);
+    const std::vector<double> found = bends(mesh);
+    EXPECT_GE(*std::min_element(found.begin(), found.end()), -1e-9);
+    EXPECT_NEAR(*std::max_element(found.begin(), found.end()), rows > 1 ? 45.0 * degree : 0.0, 1e-9);
+    // Once the middle, then half of it on either side; all together never overhang.
+    const auto count = [&](double angle) {
+      return std::count_if(found.begin(), found.end(),
+                           [&](double bend) { return std::abs(bend - angle * degree) < 1e-6; });
+    };
+    if (rows >= 7) {
+      EXPECT_EQ(count(45.0), 3);
+      EXPECT_EQ(count(22.5), 6);
+      EXPECT_EQ(count(11.25), 6);
+    }
+    for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) EXPECT_GT(mesh.face_normal(face).z(), 0.35);
+  }
+}
+
 TEST(Generators, McFoldsAcuteSquareAndObtuse) {
   const TriangleMesh mesh = built(trial_mesh_c({6, 6, 0.02}));
   expect_clean(mesh);

@@ -218,7 +218,9 @@ TEST_F(ExperimentErrors, Generators) {
   map(R"("generator":"H_4","radius":[0.1])", ErrorCode::bad_value, "radius", "two [smallest, largest]");
   map(R"("generator":"H_4","radius":[0.1,0.05])", ErrorCode::bad_value, "radius", "0.1 to 0.25");
   map(R"("generator":"H_5","number":300)", ErrorCode::bad_value, "number", "1 to 200");
-  map(R"("generator":"H_5","flank":0.01)", ErrorCode::bad_value, "flank", "0 to 0.0054");
+  map(R"("generator":"H_5","rim":0.2)", ErrorCode::bad_value, "rim", "flat coins have no rim");
+  map(R"("generator":"H_5","flank":0.05)", ErrorCode::bad_value, "flank", "0 to 0.045");
+  map(R"("generator":"H_5","field":0.6,"flank":0.01)", ErrorCode::bad_value, "flank", "0 to 0.0054");
   map(R"("generator":"H_6","radius":[0.1,0.1])", ErrorCode::bad_type, "radius", "0.001 to 0.25");
   map(R"("generator":"H_6","radius":0.25)", ErrorCode::bad_value, "radius", "0.05 to 0.22");
   map(R"("generator":"H_7","hurst":2)", ErrorCode::bad_value, "hurst", "0.05 to 1");

@@ -358,7 +358,8 @@ TEST_F(ExperimentScene, MesostructureKeysReachTheFormula) {
       {"H_3", {R"("number":4)", R"("number":4,"seed":2)"}},
       {"H_4", {R"("number":4)", R"("seed":2)", R"("radius":0.1)", R"("radius":[0.02,0.1])"}},
       {"H_5",
-       {R"("number":4)", R"("seed":2)", R"("radius":0.1)", R"("rim":0.3)", R"("field":0.3)", R"("flank":0.005)"}},
+       {R"("number":4)", R"("seed":2)", R"("radius":0.1)", R"("field":0.3)", R"("field":0.3,"rim":0.3)",
+        R"("flank":0.005)"}},
       {"H_6", {R"("width":0.05)", R"("flank":0)", R"("radius":0.1)"}},
       {"H_7", {R"("hurst":0.5)", R"("octaves":2)", R"("seed":2)"}},
   };

@@ -9,6 +9,7 @@
 #include "asperity/field/conversion/mesh_conversion.h"
 #include "asperity/field/volume/derived_fields.h"
 #include "asperity/field/volume/generators.h"
+#include "asperity/geometry/generators.h"
 #include "asperity/io/experiment.h"
 #include "asperity/io/volume_io.h"
 #include "asperity/surface/implicit/texture.h"
@@ -79,6 +80,7 @@ const std::map<std::string, Json>& expected() {
       {"stroke.type", names<StrokeType>()},
       {"stitching.folds", names<FoldMode>()},
       {"stitching.blend", names<Blend>()},
+      {"mesh_generator.bend", names<TrialBend>()},
       {"volume.component", names<VectorPart>()},
       {"volume.association", names<Association>()},
       {"volume.derive", names<DerivedField>()},

@@ -172,7 +172,12 @@ void expect_gradient(const ReliefSurface& surface, const Scene& scene, std::uint
   const Vec3 outside = foot + 3e-3 * normal;
   const Vec3 force = poke(scene, outside, p).wrench.force;
   RC_ASSERT(force.norm() > 0.0);
-  RC_ASSERT((force - potential_force(scene, outside, p)).norm() <= 1e-5 * force.norm());
+  // Under a corner the potential has a kink where another side comes to be the nearest: seed 33008001 lies 46 nm from
+  // one.
+  const auto agrees = [&](double h) {
+    return (force - potential_force(scene, outside, p, h)).norm() <= 1e-5 * force.norm();
+  };
+  RC_ASSERT(agrees(1e-7) || agrees(1e-9));
 }
 
 RC_GTEST_PROP(MesostructureConsistent, force_is_minus_the_gradient_blend_weights_included, (std::uint64_t seed)) {

@@ -311,7 +311,7 @@ class LineFilter {
 
 /// Texels along an axis of `side` (m) that hold wavelengths down to `scale`, with four for each.
 int texels_for(int texels, double side, double scale, Reconstruction reconstruction) {
-  if (reconstruction != Reconstruction::quadratic_bspline) return texels;
+  if (!is_spline(reconstruction)) return texels;
   const double needed = std::ceil(4.0 * side / scale);
   return needed < texels ? std::max(1, static_cast<int>(needed)) : texels;
 }

@@ -117,6 +117,68 @@ struct SplinePiece {
   [[nodiscard]] Three bends() const noexcept { return {in_s.bend(rows[0]), in_s.bend(rows[1]), in_s.bend(rows[2])}; }
 };
 
+using Four = std::array<double, 4>;
+
+/// The four weights of a cubic B-spline at `fraction` of the way from the second knot to the third, as multiples of
+/// differences, so that a flat neighbourhood answers exactly its height and slope 0.
+struct CubicWeights {
+  double before = 0.0;
+  double after = 0.0;
+  double beyond = 0.0;
+  double slope_before = 0.0;
+  double slope_between = 0.0;
+  double slope_after = 0.0;
+  double fraction = 0.0;
+  explicit CubicWeights(double fraction) noexcept : fraction(fraction) {
+    const double rest = 1.0 - fraction;
+    before = rest * rest * rest / 6.0;
+    after = (1.0 + 3.0 * fraction * (1.0 + fraction * rest)) / 6.0;
+    beyond = fraction * fraction * fraction / 6.0;
+    slope_before = 0.5 * rest * rest;
+    slope_between = 0.5 + fraction * rest;
+    slope_after = 0.5 * fraction * fraction;
+  }
+  [[nodiscard]] double value(const Four& at) const noexcept {
+    return at[1] + before * (at[0] - at[1]) + after * (at[2] - at[1]) + beyond * (at[3] - at[1]);
+  }
+  [[nodiscard]] double slope(const Four& at) const noexcept {
+    return slope_before * (at[1] - at[0]) + slope_between * (at[2] - at[1]) + slope_after * (at[3] - at[2]);
+  }
+  [[nodiscard]] double bend(const Four& at) const noexcept {
+    return (1.0 - fraction) * ((at[2] - at[1]) - (at[1] - at[0])) + fraction * ((at[3] - at[2]) - (at[2] - at[1]));
+  }
+};
+
+/// The bicubic piece between four texel centres: its 4 x 4 coefficients and the place between them. Each function
+/// answers, for the four rows, what becomes of them along s.
+struct CubicPiece {
+  CubicWeights in_s;
+  CubicWeights in_t;
+  Four rows[4];
+  CubicPiece(const StoredTexels& texels, Wrap wrap, const Vec2& st) noexcept
+      : CubicPiece(texels, texels_around(unit_coordinate(st.x(), wrap), texels.width),
+                   texels_around(unit_coordinate(st.y(), wrap), texels.height)) {}
+  CubicPiece(const StoredTexels& texels, const TexelPair& s, const TexelPair& t) noexcept
+      : in_s(s.fraction), in_t(t.fraction) {
+    // The first of the four is the one before `lower`: in an apron of two, at lower + 1.
+    const float* from =
+        texels.values + static_cast<std::size_t>(t.lower + 1) * texels.stride() + static_cast<std::size_t>(s.lower + 1);
+    for (Four& row : rows) {
+      row = {from[0], from[1], from[2], from[3]};
+      from += texels.stride();
+    }
+  }
+  [[nodiscard]] Four heights() const noexcept {
+    return {in_s.value(rows[0]), in_s.value(rows[1]), in_s.value(rows[2]), in_s.value(rows[3])};
+  }
+  [[nodiscard]] Four slopes() const noexcept {
+    return {in_s.slope(rows[0]), in_s.slope(rows[1]), in_s.slope(rows[2]), in_s.slope(rows[3])};
+  }
+  [[nodiscard]] Four bends() const noexcept {
+    return {in_s.bend(rows[0]), in_s.bend(rows[1]), in_s.bend(rows[2]), in_s.bend(rows[3])};
+  }
+};
+
 /// The piece of bilinear reconstruction between four texel centres, read along s at the lower pair and at the upper.
 struct BilinearPiece {
   double fraction = 0.0;  // of the way from the lower pair to the upper
@@ -183,19 +245,20 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
     double* to = &relative[y * width];
     for (std::size_t x = 0; x < width; ++x) to[x] = scale * (static_cast<double>(from[x]) - middle);
   }
-  if (reconstruction_ == Reconstruction::quadratic_bspline) {
-    const SplinePrefilter along_rows(width_, wrap_);
+  if (is_spline(reconstruction_)) {
+    const SplinePrefilter along_rows(width_, wrap_, reconstruction_);
     for (std::size_t y = 0; y < height; ++y) along_rows.solve(&relative[y * width], 1, 1);
-    SplinePrefilter(height_, wrap_).solve(relative.data(), width, width);
+    SplinePrefilter(height_, wrap_, reconstruction_).solve(relative.data(), width, width);
   }
-  stride_ = width + 2;
-  values_.resize(stride_ * (height + 2));
+  const auto apron = static_cast<std::size_t>(stored().apron());
+  const std::size_t stride = stored().stride();
+  values_.resize(stride * (height + 2 * apron));
   for (std::size_t y = 0; y < height; ++y) {
     const double* from = &relative[y * width];
-    float* to = &values_[(y + 1) * stride_ + 1];
+    float* to = &values_[(y + apron) * stride + apron];
     for (std::size_t x = 0; x < width; ++x) to[x] = static_cast<float>(from[x]);
   }
-  fill_texel_apron(values_.data(), width_, height_, wrap_);
+  fill_texel_apron(values_.data(), width_, height_, wrap_, stored().apron());
   ranges_ = RangePyramid(stored());
   const HeightRange bounds = ranges_.whole();
   // A weighted mean in floating point may leave the interval of its terms by rounding.
@@ -203,8 +266,9 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
   const double margin = bounds.lowest < bounds.highest ? 1e-15 * size : 0.0;
   lowest_ = base_ + bounds.lowest - margin;
   highest_ = base_ + bounds.highest + margin;
-  // The spline's coefficients reach four times its heights where those alternate from texel to texel.
-  rounding_ = 4.0 * margin;
+  // A spline's coefficients reach four times its heights, nine times the cubic's, where those alternate from texel to
+  // texel.
+  rounding_ = (reconstruction_ == Reconstruction::bicubic ? 9.0 : 4.0) * margin;
 }
 
 std::size_t HeightMap::memory_bytes() const noexcept {
@@ -224,9 +288,15 @@ HeightSample HeightMap::sample(const Vec2& st) const noexcept {
             {(piece.slope_below + piece.fraction * (piece.slope_above - piece.slope_below)) * width_,
              (piece.height_above - piece.height_below) * height_}};
   }
+  if (reconstruction_ == Reconstruction::bicubic) {
+    const CubicPiece piece(stored(), wrap_, st);
+    const Four heights = piece.heights();
+    return {base_ + piece.in_t.value(heights),
+            {piece.in_t.value(piece.slopes()) * width_, piece.in_t.slope(heights) * height_}};
+  }
   const TexelPlace s = texel_under(unit_coordinate(st.x(), wrap_), width_);
   const TexelPlace t = texel_under(unit_coordinate(st.y(), wrap_), height_);
-  const std::size_t row = static_cast<std::size_t>(t.index + 1) * stride_;
+  const std::size_t row = static_cast<std::size_t>(t.index + 1) * stored().stride();
   return {base_ + values_[row + static_cast<std::size_t>(s.index + 1)], Vec2::Zero()};
 }
 
@@ -241,7 +311,34 @@ Vec2 HeightMap::central_slope(const Vec2& st) const noexcept {
           (height_at(st + dt) - height_at(st - dt)) * 0.5 * height_};
 }
 
-HeightCurvature HeightMap::curvature_bilinear(const Vec2& st) const noexcept {
+namespace {
+
+/// What a spline's piece has, by whichever weights. `base`: of the heights (m).
+template <class Piece>
+HeightCurvature curvature_of(const Piece& piece, double base, double width, double height) noexcept {
+  const auto heights = piece.heights();
+  const auto slopes = piece.slopes();
+  return {base + piece.in_t.value(heights),
+          {piece.in_t.value(slopes) * width, piece.in_t.slope(heights) * height},
+          piece.in_t.value(piece.bends()) * (width * width),
+          piece.in_t.slope(slopes) * (width * height),
+          piece.in_t.bend(heights) * (height * height)};
+}
+
+/// The mixed derivative is 0 outside by the mirrored border, as the gradient is.
+void flatten_outside(HeightCurvature& curvature, const Vec2& st, Wrap wrap) noexcept {
+  if (lies_outside(st.x(), wrap)) curvature.ss = 0.0;
+  if (lies_outside(st.y(), wrap)) curvature.tt = 0.0;
+}
+
+}  // namespace
+
+HeightCurvature HeightMap::curvature_otherwise(const Vec2& st) const noexcept {
+  if (reconstruction_ == Reconstruction::bicubic) {
+    HeightCurvature curvature = curvature_of(CubicPiece(stored(), wrap_, st), base_, width_, height_);
+    flatten_outside(curvature, st, wrap_);
+    return curvature;
+  }
   const HeightSample sample = this->sample(st);
   HeightCurvature curvature{sample.height, sample.gradient, 0.0, 0.0, 0.0};
   if (reconstruction_ == Reconstruction::bilinear) {
@@ -252,19 +349,8 @@ HeightCurvature HeightMap::curvature_bilinear(const Vec2& st) const noexcept {
 }
 
 HeightCurvature HeightMap::curvature_bspline(const Vec2& st) const noexcept {
-  const SplinePiece piece(stored(), wrap_, st);
-  const Three heights = piece.heights();
-  const Three slopes = piece.slopes();
-  const double width = width_;
-  const double height = height_;
-  HeightCurvature curvature{base_ + piece.in_t.value(heights),
-                            {piece.in_t.value(slopes) * width, piece.in_t.slope(heights) * height},
-                            piece.in_t.value(piece.bends()) * (width * width),
-                            piece.in_t.slope(slopes) * (width * height),
-                            piece.in_t.bend(heights) * (height * height)};
-  // The mixed derivative is 0 there by the mirrored border, as the gradient is.
-  if (lies_outside(st.x(), wrap_)) curvature.ss = 0.0;
-  if (lies_outside(st.y(), wrap_)) curvature.tt = 0.0;
+  HeightCurvature curvature = curvature_of(SplinePiece(stored(), wrap_, st), base_, width_, height_);
+  flatten_outside(curvature, st, wrap_);
   return curvature;
 }
 

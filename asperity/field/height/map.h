@@ -15,13 +15,20 @@ namespace asperity {
 ///   bilinear           continuous, with creases on the lines between texel centres
 ///   quadratic_bspline  C1 (height and gradient continuous); prefiltered, so it passes through every texel's height.
 ///                      It overshoots steps by up to 10 % (formulation amendment 11): see `lowest`, `highest`
-enum class Reconstruction { nearest, bilinear, quadratic_bspline };
+///   bicubic            C2 (curvature continuous too): the cubic B-spline, prefiltered likewise, of 4 x 4 texels. It
+///                      overshoots steps by up to 11 %
+enum class Reconstruction { nearest, bilinear, quadratic_bspline, bicubic };
+/// Whether heights are weighted means of coefficients that are not the texels themselves. [any]
+constexpr bool is_spline(Reconstruction reconstruction) noexcept {
+  return reconstruction == Reconstruction::quadratic_bspline || reconstruction == Reconstruction::bicubic;
+}
 /// As in scene files.
 template <>
 struct Names<Reconstruction> {
   static constexpr auto table = std::to_array<Named<Reconstruction>>({{Reconstruction::nearest, "nearest"},
                                                                       {Reconstruction::bilinear, "bilinear"},
-                                                                      {Reconstruction::quadratic_bspline, "bspline"}});
+                                                                      {Reconstruction::quadratic_bspline, "bspline"},
+                                                                      {Reconstruction::bicubic, "bicubic"}});
 };
 
 /// What lies outside texture coordinates 0 to 1: the same map again, or its border continued.
@@ -102,11 +109,12 @@ class HeightMap {
   [[nodiscard]] Vec2 central_slope(const Vec2& st) const noexcept;
 
   /// Height, gradient (both equal to `sample`'s to the bit) and second derivatives of the reconstruction, which jump on
-  /// the lines where its pieces meet. In a piece of the spline, a texel, `ss` is constant along s, `tt` along t and
-  /// `st` linear along both; bilinear has `st` alone, nearest none. Outside, along a clamped axis, its own are 0.
+  /// the lines where its pieces meet, but those of `bicubic`. In a piece of the quadratic spline, a texel, `ss` is
+  /// constant along s, `tt` along t and `st` linear along both; bilinear has `st` alone, nearest none. Outside, along a
+  /// clamped axis, its own are 0.
   /// [servo]
   [[nodiscard]] HeightCurvature curvature(const Vec2& st) const noexcept {
-    return reconstruction_ == Reconstruction::quadratic_bspline ? curvature_bspline(st) : curvature_bilinear(st);
+    return reconstruction_ == Reconstruction::quadratic_bspline ? curvature_bspline(st) : curvature_otherwise(st);
   }
   /// Bounds of the height (m) over the closed rectangle between two opposite corners, which may lie outside 0 to 1; no
   /// sample in it leaves them, by rounding either. On up to 6 x 6 texels they exceed the true range by a term of second
@@ -149,14 +157,12 @@ class HeightMap {
   /// Stores offset + scale * source as the reconstruction needs it.
   void store(const std::vector<float>& source, double offset, double scale);
   [[nodiscard]] HeightCurvature curvature_bspline(const Vec2& st) const noexcept;
-  /// Or of the nearest texel, which has none.
-  [[nodiscard]] HeightCurvature curvature_bilinear(const Vec2& st) const noexcept;
+  [[nodiscard]] HeightCurvature curvature_otherwise(const Vec2& st) const noexcept;
   [[nodiscard]] StoredTexels stored() const noexcept { return {values_.data(), width_, height_, reconstruction_}; }
 
-  // Rows run with t (bottom row first) inside an apron of one texel, which holds what repeat or clamp would answer:
-  // no tap ever needs an index wrapped.
+  // Rows run with t (bottom row first) inside an apron, which holds what repeat or clamp would answer: no tap ever
+  // needs an index wrapped.
   std::vector<float> values_;  // texel heights or B-spline coefficients, m, relative to base_
-  std::size_t stride_ = 0;     // floats per stored row: width_ + 2
   double base_ = 0.0;          // m
   RangePyramid ranges_;        // relative to base_
   double rounding_ = 0.0;      // m: a sample may differ from the exact reconstruction by so much

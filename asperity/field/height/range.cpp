@@ -1,6 +1,7 @@
 #include "asperity/field/height/range.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -56,6 +57,7 @@ EndControls end_controls(const TexelSpan& span, Reconstruction reconstruction) n
   const double enters_last = span.count == 1 ? span.from : -0.5;
   EndControls ends;
   switch (reconstruction) {
+    case Reconstruction::bicubic:  // has another number of control points: CubicControls
     case Reconstruction::quadratic_bspline:
       // From x to y, across the knots k1 ... kn between texels, the spline keeps within the polygon of its blossoms at
       // (x, x), (x, k1), (k1, k2), ... (kn, y), (y, y); those of two knots are its coefficients.
@@ -144,6 +146,78 @@ HeightRange piece_range(const StoredTexels& texels, const TexelSpan& s, const Te
   return piece_range<most_texels + 2>(texels, s, t);
 }
 
+/// The cubic spline's blossom between two knots, u, v and w from 0 to 1 on the way: linear in each of them, its height
+/// where they agree. As weights of the coefficients of the knot before, both, and the one after.
+std::array<double, 4> cubic_blossom(double u, double v, double w) noexcept {
+  const double first[3][2] = {{1.0 - u, u + 2.0}, {2.0 - u, u + 1.0}, {3.0 - u, u}};
+  const double second[2][2] = {{1.0 - v, v + 1.0}, {2.0 - v, v}};
+  const double third[2] = {1.0 - w, w};
+  std::array<double, 4> weights{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t j = 0; j < 2; ++j) {
+      for (std::size_t i = 0; i < 2; ++i) weights[k + j + i] += third[k] * second[k][j] * first[k + j][i] / 6.0;
+    }
+  }
+  return weights;
+}
+
+/// The control points of the bicubic surface along one axis of a span: four on each gap between texel centres that it
+/// touches, of the part of the gap within it.
+struct CubicControls {
+  static constexpr int most_gaps = most_texels + 1;
+  int gaps = 0;
+  std::array<double, 4> weights[4 * most_gaps];  ///< of the four coefficients from that of the gap's own number on
+  std::size_t place[most_gaps + 3];              ///< where those coefficients are stored
+
+  CubicControls(const TexelSpan& span, int texels) noexcept {
+    const int first = span.from < 0.0 ? span.first - 1 : span.first;
+    const int last = std::max(first, span.first + span.count - (span.to > 0.0 ? 1 : 2));
+    gaps = last - first + 1;
+    for (int gap = 0; gap < gaps; ++gap) {
+      const double from = gap > 0 ? 0.0 : span.first + span.from - first;
+      const double to = gap + 1 < gaps ? 1.0 : span.first + span.count - 1 + span.to - last;
+      weights[4 * gap] = cubic_blossom(from, from, from);
+      weights[4 * gap + 1] = cubic_blossom(from, from, to);
+      weights[4 * gap + 2] = cubic_blossom(from, to, to);
+      weights[4 * gap + 3] = cubic_blossom(to, to, to);
+    }
+    // A span that runs over the border goes on at the other; the apron of two serves for its neighbours.
+    for (int i = 0; i < gaps + 3; ++i) {
+      const int at = first - 1 + i;
+      place[i] = static_cast<std::size_t>((at <= texels + 1 ? at : at - texels) + 2);
+    }
+  }
+};
+
+/// Bounds over a rectangle of a bicubic surface on up to most_texels a side.
+HeightRange cubic_range(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) noexcept {
+  const CubicControls across(s, texels.width);
+  const CubicControls along(t, texels.height);
+  constexpr int most_points = 4 * CubicControls::most_gaps;
+  double rows[CubicControls::most_gaps + 3][most_points];
+  for (int y = 0; y < along.gaps + 3; ++y) {
+    const float* stored = texels.values + along.place[y] * texels.stride();
+    for (int x = 0; x < 4 * across.gaps; ++x) {
+      const std::size_t* from = across.place + x / 4;
+      const auto& weights = across.weights[x];
+      rows[y][x] = weights[0] * stored[from[0]] + weights[1] * stored[from[1]] + weights[2] * stored[from[2]] +
+                   weights[3] * stored[from[3]];
+    }
+  }
+  HeightRange range{infinity, -infinity};
+  for (int y = 0; y < 4 * along.gaps; ++y) {
+    const auto* from = rows + y / 4;
+    const auto& weights = along.weights[y];
+    for (int x = 0; x < 4 * across.gaps; ++x) {
+      const double point =
+          weights[0] * from[0][x] + weights[1] * from[1][x] + weights[2] * from[2][x] + weights[3] * from[3][x];
+      range.lowest = std::min(range.lowest, point);
+      range.highest = std::max(range.highest, point);
+    }
+  }
+  return range;
+}
+
 // ---- blocks -----------------------------------------------------------------------------
 
 float rounded_down(double value) noexcept {
@@ -192,10 +266,10 @@ class Elements {
   [[nodiscard]] std::size_t columns() const { return count(texels_.width); }
   [[nodiscard]] std::size_t rows() const { return count(texels_.height); }
   void read_row(std::size_t y, BoundsRow& bounds) const {
-    const std::size_t stride = static_cast<std::size_t>(texels_.width) + 2;
-    const float* below = texels_.values + y * stride;
-    const float* above = below + stride;
+    const float* below = texels_.values + y * texels_.stride();
+    const float* above = below + texels_.stride();
     switch (texels_.reconstruction) {
+      case Reconstruction::bicubic: return read_cubic_gaps(below, bounds);
       case Reconstruction::quadratic_bspline: return read_spline_gaps(below, above, bounds);
       case Reconstruction::bilinear: return read_gaps(below, above, bounds);
       case Reconstruction::nearest: break;
@@ -224,6 +298,29 @@ class Elements {
       const double d = above[x + 1];
       set_to_bounds(bounds, x, (9.0 * a + 3.0 * b + 3.0 * c + d) / 16.0, (3.0 * a + 9.0 * b + c + 3.0 * d) / 16.0,
                     (3.0 * a + b + 9.0 * c + 3.0 * d) / 16.0, (a + 3.0 * b + 3.0 * c + 9.0 * d) / 16.0);
+    }
+  }
+  /// The control points of each gap's four quarters, from four rows of coefficients.
+  void read_cubic_gaps(const float* first, BoundsRow& bounds) const {
+    static const std::array<std::array<double, 4>, 7> halves{cubic_blossom(0.0, 0.0, 0.0), cubic_blossom(0.0, 0.0, 0.5),
+                                                             cubic_blossom(0.0, 0.5, 0.5), cubic_blossom(0.5, 0.5, 0.5),
+                                                             cubic_blossom(0.5, 0.5, 1.0), cubic_blossom(0.5, 1.0, 1.0),
+                                                             cubic_blossom(1.0, 1.0, 1.0)};
+    for (std::size_t x = 0; x < columns(); ++x) {
+      double lowest = infinity;
+      double highest = -infinity;
+      for (const auto& across : halves) {
+        double line[4] = {0.0, 0.0, 0.0, 0.0};
+        for (std::size_t y = 0; y < 4; ++y) {
+          for (std::size_t i = 0; i < 4; ++i) line[y] += across[i] * first[y * texels_.stride() + x + i];
+        }
+        for (const auto& along : halves) {
+          const double point = along[0] * line[0] + along[1] * line[1] + along[2] * line[2] + along[3] * line[3];
+          lowest = std::min(lowest, point);
+          highest = std::max(highest, point);
+        }
+      }
+      bounds.set(x, lowest, highest);
     }
   }
   StoredTexels texels_;
@@ -261,6 +358,10 @@ TexelSpan texels_under(double lower, double upper, int texels, Wrap wrap) noexce
     return {from.index, to.index + texels - from.index + 1, from.offset, to.offset};
   }
   return {0, texels, -0.5, 0.5};
+}
+
+int StoredTexels::apron() const noexcept {
+  return reconstruction == Reconstruction::bicubic ? 2 : 1;
 }
 
 RangePyramid::RangePyramid(const StoredTexels& texels) {
@@ -329,8 +430,8 @@ std::size_t RangePyramid::memory_bytes() const noexcept {
 }
 
 HeightRange RangePyramid::over(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) const noexcept {
-  const bool small = s.count <= most_texels && t.count <= most_texels;
-  return small ? piece_range(texels, s, t) : cover(texels, s, t);
+  if (s.count > most_texels || t.count > most_texels) return cover(texels, s, t);
+  return texels.reconstruction == Reconstruction::bicubic ? cubic_range(texels, s, t) : piece_range(texels, s, t);
 }
 
 HeightRange RangePyramid::cover(const StoredTexels& texels, const TexelSpan& s, const TexelSpan& t) const noexcept {

@@ -26,17 +26,22 @@ struct TexelSpan {
 /// The texels under the coordinates from `lower` to `upper` (finite, in this order) on an axis of `texels`. [servo]
 TexelSpan texels_under(double lower, double upper, int texels, Wrap wrap) noexcept;
 
-/// The numbers a relief is made of, as HeightMap stores them: rows of `width` + 2 floats, bottom row first, inside an
-/// apron of one texel; texel heights or B-spline coefficients (m), relative to the map's base.
+/// The numbers a relief is made of, as HeightMap stores them: rows of `stride` floats, bottom row first, inside an
+/// apron; texel heights or B-spline coefficients (m), relative to the map's base.
 struct StoredTexels {
   const float* values = nullptr;
   int width = 0;   ///< texels
   int height = 0;  ///< texels
   Reconstruction reconstruction{};
+  /// How many texels wide the apron is: two for bicubic, one for all others. [any]
+  [[nodiscard]] int apron() const noexcept;
+  [[nodiscard]] std::size_t stride() const noexcept {
+    return static_cast<std::size_t>(width) + 2 * static_cast<std::size_t>(apron());
+  }
 };
 
 /// Bounds of a relief over every block of 2 x 2, 4 x 4, 8 x 8 ... texels, and from them over any rectangle. The heights
-/// of the spline are bounded by its coefficients on a finer grid (it is a weighted mean of them, overshoot included);
+/// of a spline are bounded by coefficients on a finer grid (it is a weighted mean of them, overshoot included);
 /// what lies between two texels counts for the blocks of both. All heights are relative to the map's base and exact but
 /// for the rounding of double precision.
 class RangePyramid {

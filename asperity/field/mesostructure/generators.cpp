@@ -49,10 +49,16 @@ Status check_beams(const MesostructureSpec& spec) {
 Status check_coins(const MesostructureSpec& spec) {
   ASPERITY_CHECK(check_number(spec, 200));
   ASPERITY_CHECK(check_radii(*spec.radius));
-  ASPERITY_CHECK(within(spec.rim, 0.02, 0.5, "rim", "the rim's share of the radius is"));
   ASPERITY_CHECK(within(spec.field, 0.0, 1.0, "field", "the field's share of the amplitude is"));
+  const bool struck = spec.field < 1.0;
+  if (struck) {
+    ASPERITY_CHECK(within(*spec.rim, 0.02, 0.5, "rim", "the rim's share of the radius is"));
+  } else if (spec.rim) {
+    return bad_value("flat coins have no rim", "rim", "a rim around a lower \"field\", 0 to below 1");
+  }
   ASPERITY_CHECK(within(spec.overlap, 0.0, 0.9, "overlap", "the coins' overlap is"));
-  return within(*spec.flank, 0.0, 0.5 * spec.rim * spec.radius->low, "flank", "the flank's width is");
+  const double narrowest = struck ? *spec.rim * spec.radius->low : spec.radius->low;
+  return within(*spec.flank, 0.0, 0.5 * narrowest, "flank", "the flank's width is");
 }
 
 Status check_groove(const MesostructureSpec& spec) {
@@ -158,6 +164,7 @@ MesostructureSpec completed(MesostructureSpec spec) {
       own(spec.number, 5);
       own(spec.radius, ShareRange{0.09, 0.15});
       own(spec.flank, 0.0);
+      if (spec.field < 1.0) own(spec.rim, 0.12);
       break;
     case MesostructureKind::groove:
       own(spec.width, 0.08);

@@ -34,8 +34,9 @@ enum class MesostructureKind {
   /// H_4: rounded bumps and steeper warts, none overlapping, as high as they are wide and denser in the middle of the
   /// tile (along s) than at its sides; ground at 0, the widest reaches the amplitude.
   warts,
-  /// H_5: round coins lying about, a later one over an earlier one where they overlap: raised rim at the amplitude,
-  /// flat field, on the field a cross half as high as the rim over it; ground at 0.
+  /// H_5: raised flat cylinders "like a coin" lying about, a later one over an earlier one where they overlap, as high
+  /// as the amplitude; ground at 0. With a lower `field` they are struck: a rim at the amplitude around the flat field,
+  /// on the field a cross half as high as the rim over it.
   coins,
   /// H_6: a letter S cut to minus the amplitude into ground at 0; flat bottom, raised-cosine walls, clear of all
   /// borders.
@@ -80,14 +81,16 @@ struct MesostructureSpec {
   /// `beams`: share of their pitch, own: 1/3; beams and gaps are at least a texel wide. `groove`: of the stroke, 0.005
   /// to 0.2, own: 0.08.
   std::optional<double> width = std::nullopt;
-  /// `coins`: of each edge, 0 (vertical: one texel) to half of the narrowest rim, own: 0. `groove`: of each wall, 0 to
-  /// half of the width, own: a quarter of the width.
+  /// `coins`: of each edge, 0 (vertical: one texel) to half of the narrowest rim or flat coin, own: 0. `groove`: of
+  /// each wall, 0 to half of the width, own: a quarter of the width.
   std::optional<double> flank = std::nullopt;
   /// `warts`: own: 0.015 to 0.06; `coins`: own: 0.09 to 0.15; both within 0.001 to 0.25. `groove`: of both bows of the
   /// S (low = high), 0.05 to 0.24 less a quarter of the width, own: 0.16.
   std::optional<ShareRange> radius = std::nullopt;
-  double rim = 0.12;     ///< `coins`: width of the rim, share of the radius, 0.02 to 0.5
-  double field = 0.6;    ///< `coins`: height of the field, share of the amplitude, 0 to 1
+  /// `coins` with a field below 1: width of the rim, share of the radius, 0.02 to 0.5, own: 0.12. An error on flat
+  /// ones.
+  std::optional<double> rim = std::nullopt;
+  double field = 1.0;  ///< `coins`: height of the field, share of the amplitude, 0 to 1; 1: the paper's flat cylinders
   double overlap = 0.2;  ///< `coins`: how far two may overlap, share of the sum of their radii, 0 to 0.9
   double hurst = 0.8;    ///< `fractal`: Hurst exponent, 0.05 (rugged) to 1 (smooth)
   /// `fractal`: 1 to log2(size / 2), so that the finest cells have two texels; own: one fewer.

@@ -31,8 +31,8 @@ class HeightGeneratorReader {
     reader_.read("width", spec_.width);
     if (reader_.reads("flank")) spec_.flank = reader_.get("flank", own_flank());
     if (reader_.reads("radius")) read_radius();
-    reader_.read("rim", spec_.rim);
     reader_.read("field", spec_.field);
+    if (reader_.has("rim") || (reader_.reads("rim") && spec_.field < 1.0)) spec_.rim = reader_.get("rim", own_rim());
     reader_.read("overlap", spec_.overlap);
     reader_.read("hurst", spec_.hurst);
     reader_.read("octaves", spec_.octaves);
@@ -40,6 +40,8 @@ class HeightGeneratorReader {
   }
 
  private:
+  [[nodiscard]] double own_rim() const { return completed(spec_).rim.value_or(0.0); }
+
   /// The groove's follows from its width, which may be stated.
   [[nodiscard]] double own_flank() const {
     MesostructureSpec open = spec_;

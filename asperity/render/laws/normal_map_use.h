@@ -24,7 +24,8 @@ struct Names<NormalMapUse> {
 template <class L>
 Option normal_map_option(NormalMapUse L::*member) {
   return option("normal_map", member, OptionType::named<NormalMapUse>(),
-                "whether a coat's given normal map bends the force over its heights; automatic: where they are flat.");
+                "whether a coat's given normal map bends the force over its heights; automatic: where they are flat.")
+      .by_contents("felt or ignored by a printed form, which has its own way with normals");
 }
 /// Of a law that has two forms. Errors: mismatch (the literal form, which has its own way with normals). [build]
 Status check_normal_map(NormalMapUse use, Formulation formulation);

@@ -191,6 +191,20 @@ class PatchRay {
     return true;
   }
 
+  /// The motion at a time, in the shell's coordinates.
+  struct Moment {
+    double t = 0.0;
+    ShellPlace place;
+    double value = 0.0;    ///< height over the relief (m)
+    bool reached = false;  ///< by the shell
+  };
+
+  Moment at(double t, const ShellPlace& near) const noexcept {
+    Moment moment{t, near, 0.0, false};
+    moment.reached = over(t, moment.place, moment.value);
+    return moment;
+  }
+
   /// Looks for a change of sign of the height over the relief between samples within a leaf, and closes in on it.
   bool solve(const Part& part, PatchHit& best) const noexcept {
     constexpr int samples = 3;
@@ -198,56 +212,122 @@ class PatchRay {
     double to = std::min(1.0, best.t);
     if (!meets(part, from, to)) return false;
     const Vec2 middle = (part.corner[0] + part.corner[1] + part.corner[2]) / 3.0;
-    ShellPlace place{middle.x(), middle.y(), 0.0};
-    double before = 0.0;
-    double value = 0.0;
-    double t = from;
-    if (!over(t, place, value)) return false;
+    const ShellPlace guess{middle.x(), middle.y(), 0.0};
+    Moment before = at(from, guess);
     // A motion that starts on the surface starts outside it, whatever rounding says.
-    if (from == 0.0 && value < 0.0 && value >= -surface_.skin()) value = 0.0;
+    if (from == 0.0 && before.value < 0.0 && before.value >= -surface_.skin()) before.value = 0.0;
     for (int i = 1; i <= samples; ++i) {
-      before = value;
-      const double earlier = t;
-      t = i == samples ? to : from + (to - from) * i / samples;
-      ShellPlace onward = place;
-      if (!over(t, onward, value)) return false;
-      const bool enters = before >= 0.0 && value < 0.0;
-      const bool leaves = before < 0.0 && value >= 0.0;
-      if ((enters || (leaves && sides_ == Sides::both)) && close_in(earlier, before, t, value, place, best))
-        return true;
-      place = onward;
+      const double t = i == samples ? to : from + (to - from) * i / samples;
+      const Moment after = at(t, before.reached ? before.place : guess);
+      Moment first = before;
+      Moment last = after;
+      if (keep_over_face(first, last)) {
+        const bool enters = first.value >= 0.0 && last.value < 0.0;
+        const bool leaves = first.value < 0.0 && last.value >= 0.0;
+        if ((enters || (leaves && sides_ == Sides::both)) && close_in(first, last, best)) return true;
+      }
+      before = after;
     }
     return false;
   }
 
+  /// How far inside a side of the triangle a place is (barycentric).
+  static double inside(const ShellPlace& place, int side) noexcept {
+    return side == 0 ? place.u : side == 1 ? place.v : 1.0 - place.u - place.v;
+  }
+
+  /// Moves the two ends together to where the motion is over this face, which is where its relief counts: what its
+  /// formula goes on to beyond an edge may rise over the motion once more. Faces overlap by a hair, so that nothing
+  /// slips in between. False when it is nowhere over the face between them.
+  bool keep_over_face(Moment& first, Moment& last) const noexcept {
+    constexpr double overlap = 1e-9;
+    if (!first.reached && !last.reached) return false;
+    if (!last.reached && !retreat(first, last)) return false;
+    if (!first.reached && !retreat(last, first)) return false;
+    for (int side = 0; side < 3; ++side) {
+      const double at_first = inside(first.place, side) + overlap;
+      const double at_last = inside(last.place, side) + overlap;
+      if (at_first < 0.0 && at_last < 0.0) return false;
+      if (at_last < 0.0) {
+        last = at_side(first, last, side, overlap);
+      } else if (at_first < 0.0) {
+        first = at_side(last, first, side, overlap);
+        // Beside this face it came in over the neighbour if at all, where the same height had the same sign but for
+        // rounding.
+        if (first.value < 0.0 && first.value >= -1e-4 * surface_.skin()) first.value = 0.0;
+      }
+    }
+    return first.t < last.t;
+  }
+
+  /// Puts the far moment, which the shell does not reach, to the last one found that it does.
+  bool retreat(const Moment& near, Moment& far) const noexcept {
+    double beyond = far.t;
+    far = near;
+    for (int i = 0; i < 16; ++i) {
+      const Moment middle = at(0.5 * (far.t + beyond), far.place);
+      if (middle.reached)
+        far = middle;
+      else
+        beyond = middle.t;
+    }
+    return far.t != near.t;
+  }
+
+  /// The moment between one over the face and one beyond a side of it in which the motion is on that side: by false
+  /// position, in the half of the overlap that is next to the face.
+  Moment at_side(Moment within, Moment beyond, int side, double overlap) const noexcept {
+    double weight_within = inside(within.place, side) + 0.5 * overlap;
+    double weight_beyond = inside(beyond.place, side) + 0.5 * overlap;
+    if (weight_within <= 0.0) return within;
+    for (int i = 0; i < 60; ++i) {
+      double t = within.t + (beyond.t - within.t) * weight_within / (weight_within - weight_beyond);
+      if (i % 4 == 3) t = 0.5 * (within.t + beyond.t);
+      if (t == within.t || t == beyond.t) break;
+      const Moment there = at(t, within.place);
+      if (!there.reached) break;
+      const double weight = inside(there.place, side) + 0.5 * overlap;
+      if (std::abs(weight) <= 0.5 * overlap) return there;
+      if (weight > 0.0) {
+        within = there;
+        weight_within = weight;
+        weight_beyond *= 0.5;
+      } else {
+        beyond = there;
+        weight_beyond = weight;
+        weight_within *= 0.5;
+      }
+    }
+    return within;
+  }
+
   /// The root between two values of different sign: false position, halving where that is slow. The answer is on the
   /// first value's side of it.
-  bool close_in(double from, double at_from, double to, double at_to, ShellPlace place, PatchHit& best) const noexcept {
+  bool close_in(const Moment& first, const Moment& last, PatchHit& best) const noexcept {
     const double enough = 1e-4 * surface_.skin() / way_.norm();
-    ShellPlace answer = place;
-    double value = 0.0;
-    if (!over(from, answer, value)) return false;
-    double weight_from = at_from;
-    double weight_to = at_to;
+    double from = first.t;
+    double to = last.t;
+    ShellPlace answer = first.place;
+    double weight_from = first.value;
+    double weight_to = last.value;
     for (int i = 0; i < 80 && to - from > enough; ++i) {
       double t = from + (to - from) * weight_from / (weight_from - weight_to);
       if (i % 3 == 2 || !(t > from && t < to)) t = 0.5 * (from + to);
       if (t <= from || t >= to) break;
-      ShellPlace there = answer;
-      if (!over(t, there, value)) return false;
-      if ((value >= 0.0) == (at_from >= 0.0)) {
+      const Moment there = at(t, answer);
+      if (!there.reached) return false;
+      if ((there.value >= 0.0) == (first.value >= 0.0)) {
         from = t;
-        weight_from = value;
-        answer = there;
+        weight_from = there.value;
+        answer = there.place;
         weight_to *= 0.5;
       } else {
         to = t;
-        weight_to = value;
+        weight_to = there.value;
         weight_from *= 0.5;
       }
     }
-    constexpr double border = 1e-9;
-    if (from > best.t || answer.u < -border || answer.v < -border || answer.u + answer.v > 1.0 + border) return false;
+    if (from > best.t) return false;
     best = {from, answer.u, answer.v};
     return true;
   }

@@ -4,20 +4,23 @@
 
 namespace asperity {
 
-SplinePrefilter::SplinePrefilter(int count, Wrap wrap) : count_(static_cast<std::size_t>(count)) {
-  std::vector<double> diagonal(count_, 0.75);
+SplinePrefilter::SplinePrefilter(int count, Wrap wrap, Reconstruction reconstruction)
+    : count_(static_cast<std::size_t>(count)),
+      off_diagonal_(reconstruction == Reconstruction::bicubic ? 1.0 / 6.0 : 0.125) {
+  const double middle = reconstruction == Reconstruction::bicubic ? 2.0 / 3.0 : 0.75;
+  std::vector<double> diagonal(count_, middle);
   if (count_ == 1) {
     diagonal[0] = 1.0;
     eliminate(std::move(diagonal));
   } else if (wrap == Wrap::clamp) {
-    diagonal.front() = diagonal.back() = 0.875;
+    diagonal.front() = diagonal.back() = middle + off_diagonal_;
     eliminate(std::move(diagonal));
   } else if (count_ == 2) {
     // Each texel is the other's neighbour on both sides.
-    off_diagonal_ = 0.25;
+    off_diagonal_ *= 2.0;
     eliminate(std::move(diagonal));
   } else {
-    const double gamma = -0.75;
+    const double gamma = -middle;
     diagonal.front() -= gamma;
     diagonal.back() -= off_diagonal_ * off_diagonal_ / gamma;
     eliminate(std::move(diagonal));

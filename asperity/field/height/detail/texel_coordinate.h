@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "asperity/field/height/map.h"
@@ -46,21 +47,31 @@ inline TexelPair texels_around(double unit, int count) noexcept {
   return {lower, position - lower - 0.5};
 }
 
-/// Fills the apron of one texel around a map stored bottom row first with `stride` = width + 2, as the wrap mode
-/// answers there. [build]
+/// The texel that one beyond the border shows: the map again, or mirrored half a texel outside. [any]
+inline std::ptrdiff_t texel_shown_at(std::ptrdiff_t index, std::ptrdiff_t count, Wrap wrap) noexcept {
+  const std::ptrdiff_t period = wrap == Wrap::repeat ? count : 2 * count;
+  const std::ptrdiff_t within = (index % period + period) % period;
+  return within < count ? within : period - 1 - within;
+}
+
+/// Fills the apron around a map stored bottom row first with `stride` = width + 2 `apron`, as the wrap mode answers
+/// there. [build]
 template <class T>
-void fill_texel_apron(T* values, int width, int height, Wrap wrap) {
-  const std::ptrdiff_t stride = width + 2;
-  const bool repeat = wrap == Wrap::repeat;
-  for (std::ptrdiff_t y = 1; y <= height; ++y) {
-    T* row = values + y * stride;
-    row[0] = row[repeat ? width : 1];
-    row[width + 1] = row[repeat ? 1 : width];
+void fill_texel_apron(T* values, int width, int height, Wrap wrap, int apron = 1) {
+  const std::ptrdiff_t stride = width + 2 * apron;
+  for (std::ptrdiff_t y = 0; y < height; ++y) {
+    T* row = values + (y + apron) * stride + apron;
+    for (std::ptrdiff_t x = 1; x <= apron; ++x) {
+      row[-x] = row[texel_shown_at(-x, width, wrap)];
+      row[width - 1 + x] = row[texel_shown_at(width - 1 + x, width, wrap)];
+    }
   }
-  const T* below = values + (repeat ? height : 1) * stride;
-  const T* above = values + (repeat ? 1 : height) * stride;
-  std::copy(below, below + stride, values);
-  std::copy(above, above + stride, values + (height + 1) * stride);
+  for (std::ptrdiff_t y = 1; y <= apron; ++y) {
+    for (const std::ptrdiff_t to : {-y, height - 1 + y}) {
+      const T* from = values + (texel_shown_at(to, height, wrap) + apron) * stride;
+      std::copy(from, from + stride, values + (to + apron) * stride);
+    }
+  }
 }
 
 }  // namespace asperity

@@ -198,7 +198,8 @@ double distance_to_bar(const Vec2& p, double half_length, double half_width) {
 /// Height of a coin (shares of the amplitude) at `p` from its centre.
 double coin_relief(const MesostructureSpec& spec, const Coin& coin, const Vec2& p) {
   const double flank = *spec.flank;
-  const double within_rim = coin.radius * (1.0 - spec.rim);
+  if (!spec.rim) return 1.0;
+  const double within_rim = coin.radius * (1.0 - *spec.rim);
   const double on_rim = inside(within_rim - p.norm(), flank);
   const Vec2 turned = Eigen::Rotation2Dd(-coin.turn) * p;
   const double length = 0.55 * within_rim;
