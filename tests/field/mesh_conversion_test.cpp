@@ -231,5 +231,19 @@ TEST_F(MeshConversion, FailuresOfTheConverterArePassedOn) {
   EXPECT_EQ(nothing.error().code, ErrorCode::bad_mesh);
 }
 
+TEST_F(MeshConversion, ABandFarWiderThanTheMeshIsRefusedBeforeItIsMade) {
+  register_mesh_voxelizer([](const VoxelRequest&, const Progress&) -> Result<std::vector<VoxelBlock>> {
+    ADD_FAILURE() << "nothing may be made";
+    return std::vector<VoxelBlock>{};
+  });
+  ConversionSettings settings;
+  settings.resolution = 16;
+  settings.band_outside = 7.0;  // of a box of centimetres: a texture whose amplitude has lost its unit asks for that
+  const auto converted = convert_mesh(box_, settings);
+  ASSERT_FALSE(converted);
+  EXPECT_EQ(converted.error().code, ErrorCode::too_large);
+  EXPECT_EQ(converted.error().place, "voxel");
+}
+
 }  // namespace
 }  // namespace asperity::mesh_conversion_test

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "asperity/field/conversion/detail/signs.h"
@@ -154,14 +155,18 @@ class Converter {
   [[nodiscard]] double deepest() const { return 0.5 * mesh_.bounds().extent().minCoeff(); }
 
   /// About how many bytes a grid of this voxel takes: a slab as thick as the band around the whole surface, in blocks
-  /// of all directions.
+  /// of all directions, and what a band has around the edges and corners of the mesh's box beyond that (Steiner), which
+  /// is most of it where the band is wider than the mesh.
   [[nodiscard]] double estimated_bytes(double voxel) const {
     const Attempt plan = planned(voxel);
     const double inward = std::min(plan.inside, std::max(deepest(), least_band * voxel));
-    const double thick =
-        judgement_.rule == InsideRule::shell ? 2.0 * plan.outside + plan.thickness : plan.outside + inward;
-    const double area = mesh_.report().area / (voxel * voxel);
-    return area / (side * side) * (thick / (side * voxel) + 1.5) * brick_bytes;
+    const bool shell = judgement_.rule == InsideRule::shell;
+    const double outward = plan.outside + 0.5 * plan.thickness;
+    const double thick = outward + (shell ? outward : inward);
+    const double around = std::numbers::pi * outward * outward * (mesh_.bounds().extent().sum() + 4.0 / 3.0 * outward);
+    const double block = side * voxel;
+    const double area = mesh_.report().area / (block * block);
+    return (area * (thick / block + 1.5) + around / (block * block * block)) * brick_bytes;
   }
 
   [[nodiscard]] double bytes_of(const Attempt& attempt) const {
