@@ -146,6 +146,37 @@ std::vector<Stretch> stretches(const std::vector<Step>& steps) {
   return found;
 }
 
+/// What is felt between two stretches, from the last step of one to the first of the next.
+struct Passage {
+  bool crosses = false;    ///< from one face to another
+  bool at_vertex = false;  ///< near one
+  bool lifts = false;
+  double fold = 0.0;     ///< angle between the faces' normals (rad)
+  double turn = 0.0;     ///< between the forces at both ends
+  double largest = 0.0;  ///< turn within a tick
+  int turns = 0;         ///< ticks that turn
+  double least = infinity;
+  double most = 0.0;  ///< force (N)
+
+  Passage(const Press& press, std::span<const Vec3> forces, std::size_t from, std::size_t to)
+      : crosses(press.steps[from].face != press.steps[to].face),
+        fold(angle(press.steps[from].normal, press.steps[to].normal)),
+        turn(angle(forces[from], forces[to])) {
+    for (std::size_t i = from + 1; i <= to; ++i) {
+      at_vertex = at_vertex || press.steps[i].edges_near > 1;
+      lifts = lifts || press.lifted[i];
+      if (press.lifted[i]) continue;
+      least = std::min(least, forces[i].norm());
+      most = std::max(most, forces[i].norm());
+      if (press.lifted[i - 1]) continue;
+      largest = std::max(largest, angle(forces[i - 1], forces[i]));
+      turns += angle(forces[i - 1], forces[i]) > no_turn ? 1 : 0;
+    }
+  }
+  /// Far from the edge's ends, where one other face at most has a say.
+  [[nodiscard]] bool over_edge() const { return crosses && !at_vertex && !lifts; }
+};
+
 /// What there is to feel between the stretches of a walk.
 struct Counted {
   int folds = 0;           ///< passages from one face to another of another direction
@@ -164,68 +195,42 @@ struct Way {
 /// On faces a force along the face's normal, as large as k times the depth; at every fold a turn by the fold's own
 /// angle, and nowhere else any.
 Counted expect_events_at_folds_alone(const Press& press, const Scene& scene, const Way& way, const std::string& who) {
-  const std::vector<Step>& steps = press.steps;
   const std::vector<Vec3> forces = press.felt(scene);
-  const std::vector<Stretch> faces = stretches(steps);
+  const std::vector<Stretch> faces = stretches(press.steps);
   const double push = stiffness * press.depth;
-  Counted geometry;
-  Counted felt;
   double off = 0.0;
   double lean = 0.0;
-  double wrong_turn = 0.0;
-  double least = infinity;
-  double most = 0.0;
-  int jumps_due = 0;
-  int jumps = 0;
-  for (std::size_t r = 0; r < faces.size(); ++r) {
-    const Vec3& normal = steps[faces[r].first].normal;
-    for (std::size_t i = faces[r].first; i <= faces[r].last; ++i) {
-      lean = std::max(lean, angle(forces[i], normal));
+  for (const Stretch& face : faces) {
+    for (std::size_t i = face.first; i <= face.last; ++i) {
+      lean = std::max(lean, angle(forces[i], press.steps[face.first].normal));
       off = std::max(off, std::abs(forces[i].norm() - push));
-    }
-    if (r == 0) continue;
-    const std::size_t from = faces[r - 1].last;
-    const std::size_t to = faces[r].first;
-    const double fold = angle(steps[from].normal, normal);
-    const double turn = angle(forces[from], forces[to]);
-    wrong_turn = std::max(wrong_turn, std::abs(turn - fold));
-    geometry.folds += fold > 1e-9 ? 1 : 0;
-    felt.folds += turn > no_turn ? 1 : 0;
-    bool at_vertex = false;
-    bool lifts = false;
-    double largest = 0.0;
-    int turns = 0;
-    for (std::size_t i = from + 1; i <= to; ++i) {
-      at_vertex = at_vertex || steps[i].edges_near > 1;
-      lifts = lifts || press.lifted[i];
-      if (press.lifted[i]) continue;
-      least = std::min(least, forces[i].norm());
-      most = std::max(most, forces[i].norm());
-      if (press.lifted[i - 1]) continue;
-      largest = std::max(largest, angle(forces[i - 1], forces[i]));
-      turns += angle(forces[i - 1], forces[i]) > no_turn ? 1 : 0;
-    }
-    geometry.vertices += at_vertex ? 1 : 0;
-    // What follows is of edges that are crossed, far from their ends: one other face at most has a say.
-    if (at_vertex || lifts || steps[from].face == steps[to].face) continue;
-    if (fold <= 1e-9) {
-      ++geometry.flat;
-      geometry.flat_turn = std::max(geometry.flat_turn, largest);
-    } else {
-      ++jumps_due;
-      jumps += turns;
     }
   }
   EXPECT_LE(off, way.slant * push) << who;
   EXPECT_LE(lean, way.lean) << who;
-  EXPECT_LE(wrong_turn, 2.0 * way.lean) << who;
-  EXPECT_EQ(felt.folds, geometry.folds) << who;
-  if (!way.jumps) return geometry;
+  Counted geometry;
+  int events = 0;
+  int jumps_due = 0;
+  int jumps = 0;
+  for (std::size_t r = 1; r < faces.size(); ++r) {
+    const Passage passed(press, forces, faces[r - 1].last, faces[r].first);
+    EXPECT_NEAR(passed.turn, passed.fold, 2.0 * way.lean) << who;
+    const bool folded = passed.fold > 1e-9;
+    geometry.folds += folded ? 1 : 0;
+    geometry.vertices += passed.at_vertex ? 1 : 0;
+    geometry.flat += passed.over_edge() && !folded ? 1 : 0;
+    if (passed.over_edge() && !folded) geometry.flat_turn = std::max(geometry.flat_turn, passed.largest);
+    events += passed.turn > no_turn ? 1 : 0;
+    if (!way.jumps) continue;
+    jumps_due += passed.over_edge() && folded ? 1 : 0;
+    jumps += passed.over_edge() && folded ? passed.turns : 0;
+    // Under the middle of a ridge a probe is less deep than that, by the ridge's cosine: 1/3 between faces of an
+    // icosahedron.
+    EXPECT_GT(passed.least, 0.3 * push) << who;
+    EXPECT_LT(passed.most, 1.05 * push) << who;
+  }
+  EXPECT_EQ(events, geometry.folds) << who;
   EXPECT_EQ(jumps, jumps_due) << who;
-  // Under the middle of a ridge a probe is less deep than that, by the ridge's cosine: 1/3 between faces of an
-  // icosahedron.
-  EXPECT_GT(least, 0.3 * push) << who;
-  EXPECT_LT(most, 1.05 * push) << who;
   return geometry;
 }
 
