@@ -58,6 +58,8 @@ inline constexpr Host hosts[] = {
     {"change", "/change", R"({"surfaces":[{"mesh":{"generator":"box"}}],"change":{}})"},
     {"law", "/surfaces/0/law",
      R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png"},"law":{"type":"mesostructure-literal"}}]})"},
+    {"law", "/surfaces/0/law",
+     R"({"surfaces":[{"mesh":"sheet.obj","coat":{"height_map":"map.png"},"law":{"type":"mesostructure-intended"}}]})"},
     {"scene", "", R"({"surfaces":[{"mesh":{"generator":"box"}}]})"},
     {"probe", "/probe", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{}})"},
     {"ideal probe", "/probe/ideal", R"({"surfaces":[{"mesh":{"generator":"box"}}],"probe":{"ideal":{}}})"},

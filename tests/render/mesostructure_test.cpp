@@ -278,6 +278,23 @@ TEST(MesostructureIntended, heights_below_the_base_are_met_and_contact_holds_bel
   EXPECT_GE(lost, below) << "heights below 0 are never met by the printed form";
 }
 
+TEST(MesostructureIntended, a_flat_coat_is_felt_as_deep_as_its_prisms_are_told_to_be) {
+  const auto push = [](double prism_height, double depth) {
+    const Scene scene = scene_of(coated(trial_mesh_a(), flat_map(0.0), Mapping::uv),
+                                 MesostructureIntendedLaw{.prism_height = prism_height});
+    const Vec3 p(1e-3, 2e-3, -depth);
+    return poke(scene, p + Vec3(0.0, 0.0, 3e-3), p).wrench.force;
+  };
+  EXPECT_EQ(push(0.0, 0.4e-3), Vec3::Zero().eval());
+  EXPECT_LT((push(0.5e-3, 0.4e-3) - Vec3(0.0, 0.0, 0.4)).norm(), 1e-9);
+  EXPECT_EQ(push(0.5e-3, 0.6e-3), Vec3::Zero().eval());
+  // Prisms are never lower than the coat.
+  const Scene waves =
+      scene_of(coated(trial_mesh_a(), flat_map(1e-3), Mapping::uv), MesostructureIntendedLaw{.prism_height = 0.5e-3});
+  const Vec3 p(1e-3, 2e-3, 0.9e-3);
+  EXPECT_NEAR(poke(waves, p, p).wrench.force.z(), 0.1, 1e-6);
+}
+
 TEST(T1_energy, no_loop_gives_or_takes_energy_under_the_consistent_mesostructure) {
   // Once with a map that runs over the edges, once with one that steps there and has to be blended.
   const std::shared_ptr<const ReliefSurface> surfaces[] = {coated(trial_mesh_a(), wavy_map(1e-3), Mapping::uv),

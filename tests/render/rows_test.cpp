@@ -1,4 +1,4 @@
-// Rows H-I, H-II, H-neg and H-edge of the checklist (hrm-2010, tests I, II and Figures 4, 12).
+// Rows H-I and H-edge of the checklist (hrm-2010, Test I and Fig. 4).
 
 #include <gtest/gtest.h>
 
@@ -159,191 +159,25 @@ TEST(H_I, flat_coat_on_a_box_is_the_bare_mesh_away_from_folds) {
   expect_same_away_from_folds(box_mesh(Vec3(0.04, 0.03, 0.02)), 1e-3);
 }
 
-/// A map of amplitude 10 % of the edge on M_a, and where on it a point is, found without the coat.
-struct Relief {
-  MeshSource source = trial_mesh_a();
-  Box box = mesh_of(trial_mesh_a()).bounds();
-  double amplitude = 1e-3;
-  HeightMap map;
-
-  explicit Relief(MesostructureKind kind, Reconstruction how = Reconstruction::bilinear)
-      : map(must(generate_height_map({kind, 256, 1e-3, 3, 1}, Wrap::repeat, how))) {}
-
-  [[nodiscard]] Vec2 texture_at(const Vec3& p) const {
-    return {(p.x() - box.lower.x()) / box.extent().x(), (p.y() - box.lower.y()) / box.extent().y()};
-  }
-  [[nodiscard]] double height(const Vec3& p) const { return map.height_at(texture_at(p)); }
-  /// Whether the relief steps within a texel of here by more than a quarter of the amplitude.
-  [[nodiscard]] bool near_step(const Vec3& p) const {
-    const Vec2 st = texture_at(p);
-    double low = infinity;
-    double high = -infinity;
-    for (int i = -2; i <= 2; ++i) {
-      for (int j = -2; j <= 2; ++j) {
-        const double h = map.height_at(st + Vec2(0.5 * i, 0.5 * j) / map.width());
-        low = std::min(low, h);
-        high = std::max(high, h);
-      }
-    }
-    return high - low > 0.25 * amplitude;
-  }
-};
-
-struct Trace {
-  double excursion = 0.0;  ///< highest minus lowest of the probe with F/k removed (m)
-  double lowest = infinity;
-  double rms = 0.0;  ///< of the probe with F/k removed against the relief (m)
-  int samples = 0;
-};
-
-/// Slow scans at constant normal force over M_a, F/k removed, samples within a texel of a step left out (amendment 16).
-Trace scan(const Relief& relief, const Law& law, bool leave_out_steps) {
-  constexpr double force = 0.25;  // N
-  const Scene scene = scene_of(coated(relief.source, relief.map, Mapping::uv), law);
-  Trace trace;
-  double highest = -infinity;
-  double squares = 0.0;
-  ProxyState state;
-  for (const double y : {-0.0231, -0.0097, 0.0018, 0.0126, 0.0243}) {
-    for (const Vec3& base : line(Vec3(-0.034, y, 0.0), Vec3(0.034, y + 0.003, 0.0), 160)) {
-      const double z = height_at_force(scene, state, base, Vec3::UnitZ(), force, 3e-3, -3e-3) + force / stiffness;
-      if (leave_out_steps && relief.near_step(base)) continue;
-      trace.lowest = std::min(trace.lowest, z);
-      highest = std::max(highest, z);
-      squares += std::pow(z - relief.height(base), 2);
-      ++trace.samples;
-    }
-  }
-  trace.excursion = highest - trace.lowest;
-  trace.rms = std::sqrt(squares / trace.samples);
-  return trace;
-}
-
-TEST(H_II, force_shading_has_no_height_over_H_2_and_H_3) {
-  for (const MesostructureKind kind : {MesostructureKind::beams, MesostructureKind::rings}) {
-    const Relief relief(kind);
-    const Trace trace = scan(relief, ForceShadingLaw{Formulation::literal}, kind == MesostructureKind::beams);
-    EXPECT_GT(trace.samples, 600);
-    EXPECT_LT(trace.excursion, 0.05 * relief.amplitude) << paper_name(kind);
-  }
-}
-
-void expect_followed(MesostructureKind kind, bool leave_out_steps) {
-  for (const Reconstruction how : {Reconstruction::bilinear, Reconstruction::quadratic_bspline}) {
-    const Relief relief(kind, how);
-    for (const char* law : {"height-field", "mesostructure"}) {
-      const Trace trace = scan(relief, named(law), leave_out_steps);
-      EXPECT_GT(trace.samples, 600);
-      EXPECT_GT(trace.excursion, 0.6 * relief.amplitude) << law;
-      EXPECT_LT(trace.rms, 0.05 * relief.amplitude) << law << " over " << paper_name(kind);
-    }
-  }
-}
-TEST(H_II, height_field_and_mesostructure_follow_H_2_on_M_a) {
-  expect_followed(MesostructureKind::beams, true);
-}
-TEST(H_II, height_field_and_mesostructure_follow_H_3_on_M_a) {
-  expect_followed(MesostructureKind::rings, false);
-}
-TEST(H_II, height_field_and_mesostructure_follow_H_4_on_M_a) {
-  expect_followed(MesostructureKind::warts, false);
-}
-
-/// The same over the insides of faces of M_d,j, farther than the blend's band from the edges.
-void expect_followed_on_sphere(MesostructureKind kind, int subdivisions, Mapping mapping) {
-  constexpr double force = 0.05;  // N
-  const double radius = icosphere_radius_for_edge(subdivisions, 0.01);
-  const double amplitude = 1e-3;
-  const HeightMap map = must(generate_height_map({kind, 256, amplitude, 3, 1}, Wrap::repeat, Reconstruction::bilinear));
-  const auto surface = coated(icosphere(subdivisions, radius), map, mapping, 0.02);
-  const TriangleMesh& mesh = surface->base().mesh();
-  // Over the walls of H_2 a potential pushes sideways, and on a coarse base its rays lean: there the proxy alone is
-  // exact.
-  // Off the flanks of warts a point slips sideways, so there the potentials are asked.
-  std::vector<const char*> laws;
-  if (kind != MesostructureKind::warts) laws.push_back("proxy");
-  if (kind != MesostructureKind::beams) laws.insert(laws.end(), {"height-field", "mesostructure"});
-  for (const char* law : laws) {
-    const Scene scene = scene_of(surface, named(law));
-    Rng rng(5);
-    double squares = 0.0;
-    int samples = 0;
-    for (int scan = 0; scan < 12; ++scan) {
-      const std::uint32_t face = random_face(rng, mesh);
-      const Vec3 normal = mesh.face_normal(face);
-      ProxyState state;
-      for (int i = 0; i <= 50; ++i) {
-        const double t = i / 50.0;
-        const Vec3 barycentric = (1.0 - t) * Vec3(0.7, 0.15, 0.15) + t * Vec3(0.15, 0.35, 0.5);
-        const Vec3 base = point_on(mesh, face, barycentric);
-        const double z = height_at_force(scene, state, base, normal, force, 2e-3, -1e-3) + force / stiffness;
-        // Rays of the shell lean over a coarse base: the relief is where a probe that comes straight down meets it.
-        SurfaceCache hint;
-        const SweptHit met =
-            surface->view(hint).first_touch({base + 3e-3 * normal, base - 3e-3 * normal}, Sides::front);
-        ASSERT_TRUE(met.hit);
-        // Next to a wall the height under the probe depends on where exactly it stands (amendment 16).
-        if (met.contact.normal.dot(normal) < 0.8) continue;
-        squares += std::pow(z - (3e-3 - 6e-3 * met.t), 2);
-        ++samples;
-      }
-    }
-    EXPECT_LT(std::sqrt(squares / samples), 0.05 * amplitude) << law << " over " << paper_name(kind);
-  }
-}
-TEST(H_II, reliefs_are_followed_on_M_d_0_per_face) {
-  expect_followed_on_sphere(MesostructureKind::beams, 0, Mapping::per_face);
-  expect_followed_on_sphere(MesostructureKind::rings, 0, Mapping::per_face);
-  expect_followed_on_sphere(MesostructureKind::warts, 0, Mapping::per_face);
-}
-TEST(H_II, reliefs_are_followed_on_M_d_2_per_face_and_triplanar) {
-  for (const Mapping mapping : {Mapping::per_face, Mapping::triplanar}) {
-    expect_followed_on_sphere(MesostructureKind::beams, 2, mapping);
-    expect_followed_on_sphere(MesostructureKind::rings, 2, mapping);
-    expect_followed_on_sphere(MesostructureKind::warts, 2, mapping);
-  }
-}
-
-TEST(H_neg, a_groove_is_followed_by_the_consistent_laws) {
-  const Relief relief(MesostructureKind::groove);
-  for (const char* law : {"height-field", "mesostructure"}) {
-    const Trace trace = scan(relief, named(law), false);
-    EXPECT_LT(trace.lowest, -0.95 * relief.amplitude) << law;
-    EXPECT_LT(trace.rms, 0.05 * relief.amplitude) << law;
-  }
-}
-
-TEST(H_neg, a_groove_is_never_felt_by_the_literal_laws) {
-  const Relief relief(MesostructureKind::groove);
-  for (const char* law : {"height-field-literal", "mesostructure-literal"}) {
-    const Scene scene = scene_of(coated(relief.source, relief.map, Mapping::uv), named(law));
-    Rng rng(8);
-    for (int i = 0; i < 300; ++i) {
-      const Vec3 base(rng.uniform(-0.03, 0.03), rng.uniform(-0.03, 0.03), 0.0);
-      for (const Vec3& force : slide(scene, line(base + Vec3(0.0, 0.0, 2e-3), base - Vec3(0.0, 0.0, 2e-3), 40))) {
-        ASSERT_EQ(force, Vec3::Zero().eval()) << law;
-      }
-    }
-  }
-}
-
-/// Largest change of force a tick at `step` (m) along a line over many edges of M_a with a coat that steps there.
+/// Largest change of force a tick along a line, sampled every `step` (m), from one end to the other.
 struct Jumps {
   double force = 0.0;
   double normal_force = 0.0;
 };
-Jumps jumps_over_edges(Blend blend, double step) {
-  const auto surface =
-      coated(trial_mesh_a(), wavy_map(5e-4), Mapping::per_face, 0.01, 1.0, Stitching{FoldMode::keep, blend, 0.05, {}});
-  const Scene scene = scene_of(surface, MesostructureLaw{});
-  const Vec3 from(-0.0093, -0.0061, -1e-3);
-  const Vec3 to(0.0112, 0.0087, -1e-3);
+Jumps jumps_along(const Scene& scene, const Vec3& from, const Vec3& to, double step) {
   const auto path = line(from, to, static_cast<int>(std::lround((to - from).norm() / step)));
   const std::vector<Vec3> forces = slide(scene, path, from + Vec3(0.0, 0.0, 3e-3));
   Jumps jumps{largest_jump(forces), 0.0};
   for (std::size_t i = 1; i < forces.size(); ++i)
     jumps.normal_force = std::max(jumps.normal_force, std::abs(forces[i].z() - forces[i - 1].z()));
   return jumps;
+}
+
+/// Over many edges of M_a with a coat that steps there. The blend is the coat's, or the law's own where it has one.
+Jumps jumps_over_edges(Blend blend, double step, const Law& law = MesostructureLaw{}) {
+  const auto surface =
+      coated(trial_mesh_a(), wavy_map(5e-4), Mapping::per_face, 0.01, 1.0, Stitching{FoldMode::keep, blend, 0.05, {}});
+  return jumps_along(scene_of(surface, law), Vec3(-0.0093, -0.0061, -1e-3), Vec3(0.0112, 0.0087, -1e-3), step);
 }
 
 TEST(H_edge, without_a_blend_the_jump_at_edges_persists) {
@@ -361,12 +195,58 @@ TEST(H_edge, with_the_s_shape_halving_the_step_halves_the_change_of_force) {
 }
 
 TEST(H_edge, with_the_linear_blend_halving_the_step_halves_the_change_of_height) {
-  // The weight has kinks at the band's borders, so its gradient, and with it the lateral force of the potential, steps
-  // there.
   const Blend law = Blend::linear;
   const double ratio = jumps_over_edges(law, 2e-6).normal_force / jumps_over_edges(law, 1e-6).normal_force;
   EXPECT_GT(ratio, 1.6);
   EXPECT_LT(ratio, 2.4);
+}
+
+// The paper's force: along averaged normals, so that it is as continuous as the weights.
+TEST(H_edge, under_averaged_normals_the_whole_force_goes_with_the_step_under_every_blend_but_none) {
+  const auto largest = [](Blend blend, double step) {
+    return jumps_over_edges(blend, step, MesostructureIntendedLaw{.blend = blend, .prism_height = 3e-3}).force;
+  };
+  for (const Blend blend : {Blend::linear, Blend::s_shape, Blend::quintic}) {
+    const double coarse = largest(blend, 2e-6);
+    const double ratio = coarse / largest(blend, 1e-6);
+    EXPECT_GT(coarse, 1e-4) << to_string(blend);
+    EXPECT_GT(ratio, 1.6) << to_string(blend);
+    EXPECT_LT(ratio, 2.4) << to_string(blend);
+  }
+  const double unblended = largest(Blend::none, 1e-6);
+  EXPECT_GT(unblended, 0.02);
+  EXPECT_GT(largest(Blend::none, 0.5e-6), 0.95 * unblended);
+}
+
+/// Two flat halves of one plane, one higher than the other, with the band of their edge along the y axis.
+constexpr double side = 0.02;        // m, of either half: the height of the triangles over the edge
+constexpr double difference = 2e-4;  // m
+Scene scene_of_halves(Blend blend, const Law& law) {
+  TriangleMesh mesh = mesh_of(roof(0.0, side));
+  const std::vector<std::shared_ptr<const Mesostructure>> maps{tiled(flat_map(0.0)), tiled(flat_map(difference))};
+  CoatSettings settings;
+  settings.stitching = {FoldMode::keep, blend, 0.05, {}};
+  Coat coat = must(Coat::build(mesh, maps, {0, 0, 1, 1}, settings));
+  return scene_of(
+      std::make_shared<const ReliefSurface>(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat)), law);
+}
+
+// Within the band the height rises by difference / (2 rho side), beside it not at all; the force of a potential is its
+// slope, and so it has a lateral part within the band alone. No blend that has a corner can be without that step.
+TEST(H_edge, with_the_linear_blend_a_potential_pushes_sideways_within_the_band_alone) {
+  const double slope = difference / (2.0 * 0.05 * side);
+  const double depth = 1e-3;
+  const auto largest = [&](Blend blend, double step) {
+    const Scene scene = scene_of_halves(blend, MesostructureLaw{});
+    return jumps_along(scene, Vec3(-2e-3, 0.0, -depth), Vec3(2e-3, 0.0, -depth), step);
+  };
+  for (const double step : {2e-6, 1e-6, 0.5e-6}) {
+    // At the higher border the probe is deeper by the difference, and pushed that much more.
+    const double expected = stiffness * (depth + difference) * slope;
+    EXPECT_NEAR(largest(Blend::linear, step).force, expected, 0.01 * expected) << step;
+  }
+  const double smooth = largest(Blend::s_shape, 2e-6).force;
+  EXPECT_NEAR(smooth / largest(Blend::s_shape, 1e-6).force, 2.0, 0.1);
 }
 
 }  // namespace

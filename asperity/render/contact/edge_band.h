@@ -35,9 +35,8 @@ double band_weight(const L& law, const Vec3& barycentric) noexcept {
 }
 
 /// Of the prisms that hold the probe the one whose plane is nearest; no_index: none does. [servo]
-inline std::uint32_t prism_owner(const ReliefSurface& surface, const Vec3& probe) noexcept {
+inline std::uint32_t prism_owner(const ReliefSurface& surface, const Prisms& prisms, const Vec3& probe) noexcept {
   const TriangleMesh& mesh = surface.base().mesh();
-  const Prisms prisms = surface.prisms();
   std::uint32_t owner = no_index;
   double nearest = infinity;
   Box around;

@@ -23,7 +23,7 @@ LawForce literal_force(const MesostructureLaw& law, const ReliefSurface& surface
   const TriangleMesh& mesh = surface.base().mesh();
   const Prisms prisms = surface.prisms();
   LawForce answer;
-  const std::uint32_t owner = prism_owner(surface, probe);
+  const std::uint32_t owner = prism_owner(surface, prisms, probe);
   if (owner == no_index) return answer;
   const BarycentricFrame own_frame = barycentric_frame(mesh, owner);
   const double owner_distance = std::abs(own_frame.height(probe));

@@ -1,5 +1,7 @@
 #include "asperity/render/laws/mesostructure_intended.h"
 
+#include <algorithm>
+
 #include "asperity/render/contact/edge_band.h"
 #include "asperity/render/touched_surface.h"
 #include "asperity/surface/blend_option.h"
@@ -11,6 +13,10 @@ void MesostructureIntendedLaw::options(std::vector<Option>& rows) {
   rows.push_back(option("rho", &L::rho, OptionType::number({0.0, 1.0 / 3.0, true}),
                         "width of the blended band around edges in barycentric coordinates."));
   rows.push_back(blend_option(&L::blend, &L::blend_map));
+  rows.push_back(option("prism_height", &L::prism_height,
+                        OptionType::quantity(Dimension::length, Range::not_negative()),
+                        "half height of the prisms, where it is more than that of the coat: how deep a probe may be "
+                        "pressed; a flat coat is not felt without."));
 }
 
 Status MesostructureIntendedLaw::validate() const {
@@ -23,7 +29,8 @@ LawForce MesostructureIntendedLaw::force(const TouchedSurface& touched, const Ma
   const ReliefSurface& surface = view.surface();
   const TriangleMesh& mesh = surface.base().mesh();
   LawForce answer;
-  const std::uint32_t owner = prism_owner(surface, probe);
+  const Prisms prisms(mesh, std::max(prism_height, surface.prisms().half_height()));
+  const std::uint32_t owner = prism_owner(surface, prisms, probe);
   if (owner == no_index) return answer;
   const BarycentricFrame frame = barycentric_frame(mesh, owner);
   const Vec3 barycentric = frame.coordinates(probe);

@@ -23,6 +23,9 @@ struct MesostructureIntendedLaw {
   double rho = 0.05;                   ///< width of the band in barycentric coordinates, above 0, at most 1/3
   Blend blend = Blend::s_shape;        ///< weights over the band
   std::vector<double> blend_map = {};  ///< Blend::image: weights at t = 0 … 1, evenly spaced, at least two
+  /// Half height mh of the prisms (m), 0 or more, where it is more than the highest and lowest of the heights: how deep
+  /// a probe may be pressed. By itself a flat coat has no prisms, and is not felt.
+  double prism_height = 0.0;
 
   static void options(std::vector<Option>& rows);
   [[nodiscard]] Status validate() const;

@@ -22,15 +22,20 @@ bool on_own_triangles(const Touched& touch) noexcept {
          base_of(touch.instance->surface) != nullptr;
 }
 
+/// The face that is touched, or the nearest where that is not known: a law without a proxy keeps no place.
+std::uint32_t face_under(const Tick& tick, const Touched& touch, const ReliefSurface& relief) noexcept {
+  const std::uint32_t face = touch.contact->first().element;
+  if (face < relief.base().mesh().triangles().size()) return face;
+  const Foot nearest = relief.base().view(*touch.cache).nearest(touch.to_local(tick.probe->pose.position), infinity);
+  return nearest.found() ? nearest.element : 0;
+}
+
 /// The level that the probe, its speed and the view ask for around a place of the coat.
 double wanted_level(const Tick& tick, const Touched& touch, const ReliefSurface& relief,
                     const CoatMoment& last) noexcept {
   const DetailPyramid* detail = relief.coat().maps().detail();
   const SceneSettings& settings = tick.scene.settings();
-  const Place place = touch.contact->first();
-  const bool known = place.element < relief.base().mesh().triangles().size();
-  const CoatFrame frame =
-      known ? relief.view(*touch.cache, last).frame(place.element).coat : relief.coat().frame(relief.base().mesh(), 0);
+  const CoatFrame frame = relief.view(*touch.cache, last).frame(face_under(tick, touch, relief)).coat;
   double scale = 0.0;
   if (detail->kind() == DetailKind::dilation) {
     scale = settings.tip_radius / settings.view.zoom;
