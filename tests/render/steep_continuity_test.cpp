@@ -259,24 +259,50 @@ TEST(T2_continuity, of_heights_or_blends_of_class_C1_the_force_is_C0_and_no_more
   }
 }
 
-/// Over M_d,1, whose faces fold by up to 22 degrees, from where one axis alone lays a triplanar coat to where two do.
+/// Short lines over a round mesh near a direction: square over the middle of an edge, and past a vertex.
+std::vector<Line> lines_near(const TriangleMesh& mesh, const Vec3& direction) {
+  const auto nearest = [&](const auto& places) {
+    Vec3 best = places.front();
+    for (const Vec3& place : places) best = place.dot(direction) > best.dot(direction) ? place : best;
+    return best;
+  };
+  std::vector<Vec3> middles;
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    for (std::size_t k = 0; k < 3; ++k)
+      middles.emplace_back(0.5 * (mesh.corners(face)[k] + mesh.corners(face)[(k + 1) % 3]));
+  }
+  const Vec3 middle = nearest(middles);
+  const Vec3 vertex = nearest(mesh.positions());
+  const Vec3 across = middle.cross(vertex - middle).normalized();
+  const Vec3 past = vertex + 0.5e-3 * across;
+  const Vec3 along = (vertex - middle).normalized();
+  return {{"over an edge", middle - 3.2e-3 * across, middle + 3.2e-3 * across},
+          {"past a vertex", past - 3.2e-3 * along, past + 3.2e-3 * along}};
+}
+
+/// Over M_d,1, whose faces fold by up to 22 degrees, where one axis alone lays a triplanar coat and where two do.
 TEST(T2_continuity, on_steep_reliefs_round_a_sphere_whose_folds_are_rounded) {
   Miss miss("modulus round a sphere");
-  constexpr double radius = 0.04;
-  const Vec3 from = radius * Vec3(0.25, 0.3, 1.0).normalized();
-  const Vec3 to = radius * Vec3(0.65, 0.2, 1.0).normalized();
-  const Vec3 up = (from + to).normalized();
+  const TriangleMesh mesh = mesh_of(icosphere(1, 0.04));
   for (const auto& [mapping, repeat] : {std::pair(Mapping::triplanar, 1.0), std::pair(Mapping::per_face, 2.5)}) {
     const auto surface =
-        relief_on(mesh_of(icosphere(1, radius)), unlike_maps(1.5e-3),
+        relief_on(mesh, unlike_maps(1.5e-3),
                   CoatSettings{mapping, Vec2::Constant(repeat), {FoldMode::round, Blend::quintic, 0.15, {}}});
     ASSERT_TRUE(surface->report().fits());
     for (const auto& [law, depth] : {std::pair("mesostructure", 0.4e-3), std::pair("proxy", 0.1e-3)}) {
-      const Way way = Way::under(*surface, from, to, up, depth, 0.2e-3);
       const Scene scene = scene_of(surface, named(law));
-      const std::string name = std::string(law) + (mapping == Mapping::triplanar ? ", triplanar" : ", per face");
-      expect_modulus_stays(miss, scene, way, up, name);
-      EXPECT_GT(change_along(scene, way, up, 2e-5, false).steepest, 45.0) << name;
+      double steepest = 0.0;
+      for (const Vec3 up : {Vec3(0.1, 0.2, 1.0).normalized(), Vec3(0.8, 0.1, 0.8).normalized()}) {
+        if (mapping == Mapping::per_face && up.x() > 0.5) continue;
+        for (const Line& line : lines_near(mesh, up)) {
+          const Way way = Way::under(*surface, line.from, line.to, up, depth, 0.2e-3);
+          const std::string name = fmt::format("{}, {}, {}", law, to_string(mapping), line.name);
+          // Rounded reliefs are dear, and a proxy at rest the more.
+          expect_modulus_stays(miss, scene, way, up, name, std::string(law) == "proxy" ? 2e-6 : 2e-7);
+          steepest = std::max(steepest, change_along(scene, way, up, 2e-5, false).steepest);
+        }
+      }
+      EXPECT_GT(steepest, 45.0) << law;
     }
   }
 }
