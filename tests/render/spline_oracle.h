@@ -2,7 +2,7 @@
 // Reliefs as their texels define them, worked out from the definitions alone: what the library's heights are compared
 // with.
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 
 #include <cmath>
 #include <cstddef>
