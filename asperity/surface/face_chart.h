@@ -156,8 +156,9 @@ class FaceChart {
 
   Turn at_edge(WalkStep& step, const Vec3& goal, bool may_leave, int k, int& moves) noexcept {
     Place across = place_;
+    const double rest = rest_length(moves == 0);
     // Beyond the rim there is nothing that could hold the point.
-    if (!cross_edge(across, k)) return may_leave ? Turn::rim : along_edge(step, goal, k);
+    if (!cross_edge(across, k)) return may_leave ? Turn::rim : along_edge(step, goal, k, rest);
     ++moves;
     const Spot there = faces_.evaluate(across.frame, across.u, across.v);
     // Without stitching the other face may stand higher: a wall.
@@ -168,15 +169,15 @@ class FaceChart {
         place_ = across;
         spot_ = there;
         step = onward;
-        return onward.length <= rest_length(false) ? Turn::rest : Turn::go;
+        return onward.length <= rest ? Turn::rest : Turn::go;
       }
     }
-    return along_edge(step, goal, k);
+    return along_edge(step, goal, k, rest);
   }
 
-  Turn along_edge(WalkStep& step, const Vec3& goal, int k) const noexcept {
+  Turn along_edge(WalkStep& step, const Vec3& goal, int k, double rest) const noexcept {
     step = step_along_edge(place_, spot_, goal, k);
-    return step.length <= rest_length(false) || !admissible(place_, step) ? Turn::rest : Turn::go;
+    return step.length <= rest || !admissible(place_, step) ? Turn::rest : Turn::go;
   }
 
   /// At a vertex every face around it is tried, then every edge.
@@ -186,6 +187,7 @@ class FaceChart {
     Place best = place_;
     Spot best_spot = spot_;
     WalkStep best_step;
+    const double rest = rest_length(moves == 0);
     bool rim = false;
     for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
       if (moves >= walk_budget) break;
@@ -207,7 +209,7 @@ class FaceChart {
       }
       for (int k = 1; k <= 2; ++k) rim = rim || mesh.neighbour(face, ((own + k) % 3 + 1) % 3) == no_index;
     }
-    if (best_step.length <= rest_length(false)) return rim && may_leave ? Turn::rim : Turn::rest;
+    if (best_step.length <= rest) return rim && may_leave ? Turn::rim : Turn::rest;
     place_ = best;
     spot_ = best_spot;
     step = best_step;

@@ -89,7 +89,8 @@ class ExactGodObject {
 };
 
 /// The sphere baked onto an icosphere of 20 * 4^subdivisions triangles.
-inline std::shared_ptr<const ReliefSurface> baked(const WavySphere& sphere, int subdivisions, int texels) {
+inline std::shared_ptr<const ReliefSurface> baked(const WavySphere& sphere, int subdivisions, int texels,
+                                                  Reconstruction how = Reconstruction::quadratic_bspline) {
   MeshSource source = icosphere(subdivisions, sphere.radius);
   const TriangleMesh plain = mesh_of(source);
   const ReliefAtlas atlas =
@@ -97,8 +98,7 @@ inline std::shared_ptr<const ReliefSurface> baked(const WavySphere& sphere, int 
                        [&](const Vec3& origin, const Vec3& direction) { return sphere.ray(origin, direction); }));
   source.corner_uvs = atlas.corner_uvs;
   TriangleMesh mesh = mesh_of(source);
-  HeightMap map =
-      must(HeightMap::build(atlas.heights, atlas.width, atlas.height, Wrap::clamp, Reconstruction::quadratic_bspline));
+  HeightMap map = must(HeightMap::build(atlas.heights, atlas.width, atlas.height, Wrap::clamp, how));
   CoatSettings settings;
   // The surface is round where the base has folds: penetrations agree over an edge, heights over flat triangles do not.
   settings.stitching.folds = FoldMode::round;

@@ -1,5 +1,5 @@
-// T1 loop work, T2 continuity and T3 reconstruction (formulation D8 with amendments 1 and 5), for the proxy and for the
-// consistent force laws.
+// T1 loop work and T2 continuity (formulation D8 with amendments 1 and 5), for the proxy and for the consistent force
+// laws.
 
 #include <gtest/gtest.h>
 
@@ -313,42 +313,6 @@ TEST(T2_continuity, the_mesostructure_law_over_all_dihedrals_with_unequal_height
       EXPECT_NEAR(middle / coarse, 1.0, 0.2) << name << ", " << coarse * 1e-5 << " N a step";
       EXPECT_NEAR(fine / middle, 1.0, 0.2) << name << ", " << middle * 1e-6 << " N a step";
     }
-  }
-}
-
-/// Scan lines at a constant 1 N, quasi-static: how far the proxy is from the relief as reconstructed, RMS, as a share
-/// of the amplitude.
-double reconstruction_error(const MesostructureSpec& spec, double tile) {
-  const HeightMap map = must(generate_height_map(spec, Wrap::repeat, Reconstruction::quadratic_bspline));
-  const auto surface = coated(plane_grid(tile, tile, 6, 6), map, Mapping::uv, tile);
-  const Scene scene = scene_with(surface, ProxyLaw{});
-  double squares = 0.0;
-  int count = 0;
-  for (int scan = 0; scan < 4; ++scan) {
-    const double across = (-0.37 + 0.24 * scan) * tile;
-    ProxyState state;
-    touch(scene, state, Vec3(-0.45 * tile, across, 3.0 * spec.amplitude));
-    for (int i = 0; i <= 150; ++i) {
-      const Vec3 base((-0.45 + 0.9 * i / 150.0) * tile, across, 0.0);
-      height_at_force(scene, state, base, Vec3::UnitZ(), 1.0, 2.0 * spec.amplitude, -2e-3 - 2.0 * spec.amplitude);
-      const Vec3& proxy = state.proxy;
-      const double relief = map.height_at(Vec2(proxy.x() / tile + 0.5, proxy.y() / tile + 0.5));
-      squares += (proxy.z() - relief) * (proxy.z() - relief);
-      ++count;
-    }
-  }
-  return std::sqrt(squares / count) / spec.amplitude;
-}
-
-TEST(T3_reconstruction, scan_lines_of_the_proxy_at_one_newton_are_the_relief) {
-  for (const MesostructureKind kind :
-       {MesostructureKind::beams, MesostructureKind::rings, MesostructureKind::warts, MesostructureKind::groove}) {
-    MesostructureSpec spec;
-    spec.kind = kind;
-    spec.size = 128;
-    spec.amplitude = 0.5e-3;
-    spec.count = 4;
-    EXPECT_LE(reconstruction_error(spec, 0.04), 0.01) << paper_name(kind);
   }
 }
 

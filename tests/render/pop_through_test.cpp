@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/render/fixtures.h"
+#include "tests/surface/folded.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::pop_through_test {
@@ -280,6 +281,87 @@ TEST(T5_pop_through, a_proxy_on_an_open_sheet_passes_only_around_its_rim) {
     };
     lead(scene, rng, Vec3(0.0, 0.0, side * 2e-3), 10000, next, check);
   }
+}
+
+/// What planes leave free, each `height` over a face of a concave mesh: a convex room, in which the proxy of a probe
+/// is the point of it nearest to the probe.
+class ConvexRoom {
+ public:
+  ConvexRoom(const TriangleMesh& mesh, double height) {
+    for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+      const Vec3 normal = mesh.face_normal(face);
+      planes_.push_back({normal, normal.dot(mesh.corners(face)[0]) + height});
+    }
+  }
+
+  /// Brute force over all faces, edges and corners that any planes could have in common.
+  [[nodiscard]] Vec3 nearest(const Vec3& p) const {
+    Vec3 best = p;
+    double distance = infinity;
+    const auto offer = [&](const Vec3& point) {
+      for (const Plane& plane : planes_) {
+        if (plane.normal.dot(point) < plane.level - 1e-12) return;
+      }
+      if (const double now = (point - p).norm(); now < distance) {
+        distance = now;
+        best = point;
+      }
+    };
+    offer(p);
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      offer(p - (planes_[i].normal.dot(p) - planes_[i].level) * planes_[i].normal);
+      for (std::size_t j = 0; j < i; ++j) {
+        const Vec3 along = planes_[i].normal.cross(planes_[j].normal);
+        if (along.norm() < 1e-6) continue;
+        offer(meeting(planes_[i], planes_[j], {along, along.dot(p)}));
+        for (std::size_t k = 0; k < j; ++k) {
+          if (std::abs(along.dot(planes_[k].normal)) > 1e-6) offer(meeting(planes_[i], planes_[j], planes_[k]));
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  struct Plane {
+    Vec3 normal;
+    double level;  // m
+  };
+  static Vec3 meeting(const Plane& a, const Plane& b, const Plane& c) {
+    Mat3 normals;
+    normals << a.normal.transpose(), b.normal.transpose(), c.normal.transpose();
+    return normals.inverse() * Vec3(a.level, b.level, c.level);
+  }
+  std::vector<Plane> planes_;
+};
+
+TEST(T5_pop_through, valleys_sharper_than_a_right_angle_hold_the_proxy_at_the_nearest_point_of_their_room) {
+  // Down to the angle below which directions would be so long that the relief is made lower instead.
+  constexpr double height = 0.2e-3;
+  const auto expect_held = [](const std::string& name, MeshSource source, double bottom) {
+    const auto surface = coated(std::move(source), flat_map(height), Mapping::triplanar);
+    const ConvexRoom room(surface->base().mesh(), height);
+    const Scene scene = proxied(surface, Sides::both, 0.0);
+    Rng rng(54);
+    const Vec3 centre(0.0, 0.3e-3, bottom);
+    const auto next = [&] { return Vec3(centre + random_vector(rng, 1.5e-3)); };
+    int pressed = 0;
+    lead(scene, rng, centre + Vec3(0.0, 0.0, 2e-3), 5000, next, [&](int i, const Vec3& probe, const ForceSample& felt) {
+      const Vec3 right = stiffness * (room.nearest(probe) - probe);
+      pressed += right.norm() > 0.0 ? 1 : 0;
+      // What the proxy's descent leaves undone.
+      ASSERT_LT((felt.wrench.force - right).norm(), 5e-4) << name << ", tick " << i << ", probe " << probe.transpose();
+    });
+    EXPECT_GT(pressed, 3000) << name;
+  };
+  for (const double opening : {120.0, 91.0, 89.0, 75.0, 60.0, 45.0}) {
+    const double half = 0.5 * opening * std::numbers::pi / 180.0;
+    expect_held(std::to_string(opening) + " degrees", valley(2.0 * half, 0.02), height / std::sin(half));
+  }
+  // Six faces around one vertex: those that face each other turn by more than a right angle.
+  MeshSource cup = trial_mesh_e(1, std::numbers::pi / 2.0, 0.01);
+  const Vec3 vertex = cup.positions[0];
+  expect_held("cup of six faces", std::move(cup), vertex.z() + height);
 }
 
 }  // namespace

@@ -25,10 +25,12 @@ inline std::shared_ptr<const ReliefSurface> relief_on(TriangleMesh mesh,
 }
 
 /// Three unlike reliefs of the same amplitude (m): what neighbouring faces disagree about.
-inline std::vector<std::shared_ptr<const Mesostructure>> unlike_maps(double amplitude, double tile = 0.01) {
+inline std::vector<std::shared_ptr<const Mesostructure>> unlike_maps(
+    double amplitude, double tile = 0.01, Reconstruction how = Reconstruction::quadratic_bspline) {
   const double turn = 2.0 * std::numbers::pi;
-  const HeightMap stripes = map_of(16, [=](double s, double t) { return amplitude * std::sin(turn * (s - t) + 0.7); });
-  return {tiled(wavy_map(amplitude, 16), tile), tiled(flat_map(0.6 * amplitude), tile), tiled(stripes, tile)};
+  const HeightMap stripes = map_of(
+      16, [=](double s, double t) { return amplitude * std::sin(turn * (s - t) + 0.7); }, Wrap::repeat, how);
+  return {tiled(wavy_map(amplitude, 16, how), tile), tiled(flat_map(0.6 * amplitude), tile), tiled(stripes, tile)};
 }
 
 /// A cone of `count` narrow triangles: one vertex of high valence, open at its base.

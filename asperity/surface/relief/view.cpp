@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "asperity/surface/face_chart.h"
 #include "asperity/surface/tangents.h"
@@ -64,6 +65,44 @@ struct ReliefFaces {
   [[nodiscard]] static bool free(const ReliefFrame&, const ReliefPoint&, const ReliefPoint&) noexcept { return true; }
 };
 
+/// The edge, or the corner, of its triangle that a place lies at; -1: none.
+struct Border {
+  int edge = -1;
+  int corner = -1;
+};
+
+Border border_within(double room, const TriangleMesh& mesh, const Place& place) noexcept {
+  const BarycentricFrame base = barycentric_frame(mesh, place.element);
+  Border border;
+  int near = 0;
+  int far = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (place.at[k] > room * base.gradient[k].norm()) {
+      far = k;
+    } else {
+      ++near;
+      border.edge = (k + 1) % 3;
+    }
+  }
+  if (near > 1) border = {-1, far};
+  return border;
+}
+
+/// The same place of an edge or a corner on another face around it.
+Vec3 shared_place(const TriangleMesh& mesh, const Place& place, const Border& border, std::uint32_t face) noexcept {
+  const TriangleMesh::Triangle& corners = mesh.triangles()[place.element];
+  Vec3 there = Vec3::Zero();
+  const auto put = [&](int corner, double share) {
+    there[static_cast<int>(mesh.corner_of(face, corners[static_cast<std::size_t>(corner)]))] = share;
+  };
+  if (border.corner >= 0) {
+    put(border.corner, 1.0);
+  } else {
+    for (const int end : {border.edge, (border.edge + 1) % 3}) put(end, place.at[end]);
+  }
+  return there;
+}
+
 }  // namespace
 
 DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
@@ -83,6 +122,36 @@ DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal
   place.element = cache.place.frame.face;
   place.at = {1.0 - cache.place.u - cache.place.v, cache.place.u, cache.place.v};
   return end;
+}
+
+Vec3 ReliefView::way_off(const Place& place, const ReliefPoint& spot) const noexcept {
+  // In a valley sharper than a right angle the normal of one flank leads into the other.
+  constexpr double near_skins = 4.0;
+  constexpr double least_product = 0.01;
+  constexpr int most_rounds = 16;
+  const TriangleMesh& mesh = surface_->base().mesh();
+  Vec3 away = place.side() * spot.front;
+  const Border border = border_within(near_skins * skin(), mesh, place);
+  std::uint32_t across[2] = {place.element, place.element};
+  std::span<const std::uint32_t> around;
+  if (border.corner >= 0) {
+    around = mesh.faces_of_vertex(mesh.triangles()[place.element][static_cast<std::size_t>(border.corner)]);
+  } else if (border.edge >= 0 && mesh.neighbour(place.element, border.edge) != no_index) {
+    across[1] = mesh.neighbour(place.element, border.edge);
+    around = across;
+  }
+  bool turned = !around.empty();
+  for (int round = 0; turned && round < most_rounds; ++round) {
+    turned = false;
+    for (const std::uint32_t face : around) {
+      const Vec3 there = shared_place(mesh, place, border, face);
+      const Vec3 front = place.side() * surface_->point(surface_->frame(face, moment_), there[1], there[2]).front;
+      if (front.dot(away) >= least_product) continue;
+      away = (away + front).normalized();
+      turned = true;
+    }
+  }
+  return away;
 }
 
 Mat3 ReliefView::bend(const Place& place, const ReliefPoint& spot) const noexcept {

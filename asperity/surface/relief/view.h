@@ -42,7 +42,7 @@ class ReliefView {
   [[nodiscard]] Vec3 front(const Foot& foot) const noexcept { return at(place_of(foot)).front; }
   DescentEnd descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept;
   bool launch(const Place& place, const ReliefPoint& spot, Vec3& from) const noexcept {
-    from = spot.point + place.side() * surface_->skin() * spot.front;
+    from = spot.point + skin() * way_off(place, spot);
     return true;
   }
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p, *cache_, moment_); }
@@ -80,6 +80,8 @@ class ReliefView {
     return cache;
   }
   [[nodiscard]] static Place place_of(const Foot& foot) noexcept { return {foot.element, false, foot.at}; }
+  /// Unit direction that leads off a place, on its side, and away from all faces around it.
+  [[nodiscard]] Vec3 way_off(const Place& place, const ReliefPoint& spot) const noexcept;
   template <class Skip>
   [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept;
 
