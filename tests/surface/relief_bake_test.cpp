@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,49 @@ TEST(ReliefBake, a_plane_over_a_sheet_has_one_height) {
     EXPECT_NEAR(baked.report.lowest, height, 1.1e-9);
     EXPECT_NEAR(baked.report.highest, height, 1.1e-9);
     for (const AtlasTexel& texel : texels_over(sheet, 8)) EXPECT_NEAR(baked.atlas.heights[texel.index], height, 1.2e-9);
+  }
+}
+
+TEST(ReliefBake, all_around_a_triangle_its_plane_goes_on) {
+  // Into the acute corners, too, where what is nearest lies in none of the three sides' own strips.
+  const TriangleMesh sheet = mesh_of(plane_grid(0.1, 0.1, 4, 4));
+  for (const int texels : {5, 8, 24}) {
+    const BakedRelief baked =
+        must(bake_relief(sheet, [&](const Vec3& p) { return p.z() - 0.4e-3; }, {.texels = texels}));
+    must(bake_relief(sheet, texels, [&](const AtlasTexel& texel) {
+      EXPECT_NEAR(baked.atlas.heights[texel.index], 0.4e-3, 1.2e-9) << texel.u * texels << " " << texel.v * texels;
+      return 0.0;
+    }));
+  }
+}
+
+TEST(ReliefBake, a_texel_takes_after_one_of_the_nearest_that_may_be_taken) {
+  const TriangleMesh sheet = mesh_of(plane_grid(0.1, 0.1, 1, 1));
+  for (const int texels : {5, 8, 16}) {
+    std::map<std::size_t, AtlasTexel> all;
+    must(bake_relief(sheet, texels, [&](const AtlasTexel& texel) {
+      all.emplace(texel.index, texel);
+      return 0.0;
+    }));
+    const auto beside = [&](const AtlasTexel& at) { return texels * std::max({-at.u, -at.v, at.u + at.v - 1.0}); };
+    for (const double border : {0.01, 3.2}) {
+      for (const auto& [index, texel] : all) {
+        if (beside(texel) <= border) continue;
+        const auto apart = [&, here = texel](const AtlasTexel& one) {
+          return one.face == here.face ? texels * std::hypot(one.u - here.u, one.v - here.v) : infinity;
+        };
+        const std::ptrdiff_t step = nearest_texel_within(texel, border, texels);
+        const auto taken = all.find(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(index) + step));
+        ASSERT_TRUE(taken != all.end());
+        EXPECT_LE(beside(taken->second), border);
+        double nearest = infinity;
+        for (const auto& [other, one] : all) {
+          if (beside(one) <= border) nearest = std::min(nearest, apart(one));
+        }
+        // Texels are whole: one diagonally beside it may be as good a choice for all that the rounding knows.
+        EXPECT_LT(apart(taken->second), nearest + 1.5) << texel.u * texels << " " << texel.v * texels;
+      }
+    }
   }
 }
 

@@ -35,7 +35,9 @@ std::ptrdiff_t nearest_texel_within(const AtlasTexel& texel, double border, int 
   const double margin = (border - 0.7) / texels;
   double u = texel.u;
   double v = texel.v;
-  for (int i = 0; i < 3; ++i) {
+  // Back and forth between two sides towards an acute corner: what is left halves each time.
+  constexpr int most_rounds = 16;
+  for (int i = 0; i < most_rounds; ++i) {
     u = std::max(u, -margin);
     v = std::max(v, -margin);
     const double beyond = 0.5 * std::max(0.0, u + v - 1.0 - margin);
