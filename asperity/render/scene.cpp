@@ -274,8 +274,8 @@ InstanceFacts facts_of(const Instance& instance) {
   facts.volume = iso_of(instance.surface) != nullptr;
   facts.varies = has_local_material(instance);
   facts.holds_friction = proxy_holds_friction(instance);
-  facts.rubs =
-      facts.holds_friction && (facts.varies || material.static_friction > 0.0 || material.dynamic_friction > 0.0);
+  // The dynamic coefficient is at most the static one.
+  facts.rubs = facts.holds_friction && (facts.varies || material.static_friction > 0.0);
   facts.adds_friction = adds_friction(instance);
   facts.moves = instance.motion.moves();
   facts.at_origin = !facts.moves && instance.world_from_object.is_identity();

@@ -342,7 +342,6 @@ CoatFrame Coat::frame(const TriangleMesh& mesh, std::uint32_t face, const CoatMo
 CoatFrame Coat::layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept {
   CoatFrame laid = frame;
   laid.maps = layer.maps.get();
-  laid.layers = {};
   laid.st = frame.st.cwiseProduct(layer.repeat);
   laid.st_u = frame.st_u.cwiseProduct(layer.repeat);
   laid.st_v = frame.st_v.cwiseProduct(layer.repeat);

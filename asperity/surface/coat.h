@@ -175,6 +175,7 @@ class Coat {
   [[nodiscard]] HeightJet layered_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightRange own_range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// Of a layer's map by itself: for own_jet and own_range, which look at no layers.
   [[nodiscard]] CoatFrame layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept;
   Status take_layers(std::vector<CoatLayer> layers);
   void find_seams(const TriangleMesh& mesh);

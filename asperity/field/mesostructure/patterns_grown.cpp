@@ -15,7 +15,7 @@ using std::numbers::pi;
 
 /// Height of a round thing of radius 1 over its middle plane.
 double round_top(double q) {
-  return q * q < 1.0 ? std::sqrt(1.0 - q * q) : 0.0;
+  return std::sqrt(std::max(0.0, 1.0 - q * q));
 }
 
 /// Which thread lies on top at a crossing of warp `i` (along t) and weft `j` (along s).

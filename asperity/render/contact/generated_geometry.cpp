@@ -50,10 +50,10 @@ class GeneratedPatch::BlockSearch {
     gradient_[1] = prism.edge_v.cross(cross) / area;
     gradient_[2] = cross.cross(prism.edge_u) / area;
     gradient_[0] = -gradient_[1] - gradient_[2];
-    normal_ = cross / std::sqrt(area);
+    gradient_[3] = cross / std::sqrt(area);
     const Vec3 offset = centre - prism.corner;
     centre_ = {1.0 + gradient_[0].dot(offset), gradient_[1].dot(offset), gradient_[2].dot(offset)};
-    level_ = normal_.dot(offset);
+    level_ = gradient_[3].dot(offset);
   }
 
   /// Calls visit(cells) for blocks that hold them all. False when visit answers false, or there are too many to look
@@ -127,7 +127,7 @@ class GeneratedPatch::BlockSearch {
       const Vec3 direction = frame_.prism.direction_at(at.x(), at.y());
       for (const double height : {lowest, highest}) {
         for (int k = 0; k < 4; ++k) {
-          const double value = height * (k < 3 ? gradient_[k] : normal_).dot(direction);
+          const double value = height * gradient_[k].dot(direction);
           low[k] = std::min(low[k], value);
           high[k] = std::max(high[k], value);
         }
@@ -165,10 +165,9 @@ class GeneratedPatch::BlockSearch {
   const ReliefFrame& frame_;
   int subdivisions_;
   double radius_;
-  int& looks_;  ///< that may still be spent on narrowing
-  Vec3 gradient_[3];
-  Vec3 normal_;
-  Vec3 centre_;  ///< barycentric coordinates of the ball's centre
+  int& looks_;        ///< that may still be spent on narrowing
+  Vec3 gradient_[4];  ///< of the barycentric coordinates (1/m), and of the height over the plane: its unit normal
+  Vec3 centre_;       ///< barycentric coordinates of the ball's centre
   double level_ = 0.0;
 };
 

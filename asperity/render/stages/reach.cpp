@@ -141,9 +141,8 @@ int level_now(const Tick& tick) noexcept {
     if (field.bricks() == nullptr) return;
     const Vec3& position = tick.probe->pose.position;
     field.bricks()->look_ahead(pose.apply_inverse(position), pose.rotate_inverse(tick.probe->twist.linear));
-    const int finest = std::clamp(tick.state.wanted_level, 0, field.levels() - 1);
     const Box box = tick_reach(field, pose, tick.state, position, tick.scene.probe_radius());
-    level = std::max(level, field.ready_level(box, finest));
+    level = std::max(level, field.ready_level(box, tick.state.wanted_level));
   });
   return level;
 }

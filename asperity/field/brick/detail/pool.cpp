@@ -65,11 +65,11 @@ Status BrickPool::allocate(std::size_t resident_bytes) {
 }
 
 Status BrickPool::pin() {
+  // The coarsest level is always here: it is a single brick.
   std::size_t pinned = 0;
-  first_pinned_ = static_cast<std::uint32_t>(header_.bricks.size());
   for (auto level = header_.levels.rbegin(); level != header_.levels.rend(); ++level) {
     pinned += level->count();
-    if (first_pinned_ < header_.bricks.size() && pinned > std::max<std::size_t>(slots() / pinned_share, 1)) break;
+    if (pinned > std::max<std::size_t>(slots() / pinned_share, 1)) break;
     first_pinned_ = level->first;
   }
   for (std::uint32_t brick = first_pinned_; brick < header_.bricks.size(); ++brick) ASPERITY_CHECK(load(brick));
