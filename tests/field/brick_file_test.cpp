@@ -83,6 +83,17 @@ TEST_F(BrickFile, HoldsEverySampleOfEveryTypeUpToTheBorders) {
   }
 }
 
+TEST_F(BrickFile, ANameThatIsTooLongIsCutAndStillReads) {
+  const ScalarGrid grid = noise(uneven_axes(5, 4, 3));
+  for (const std::size_t length : {std::size_t{4095}, std::size_t{4096}, std::size_t{5000}}) {
+    std::string name(length, 'n');
+    for (std::size_t i = 0; i < length; i += 7) name[i] = static_cast<char>('a' + i % 26);
+    ASSERT_TRUE(write_brick_file(path(), *ScalarGrid::build(grid.axes(), grid.samples(), name)).ok());
+    ASSERT_EQ(refusal(path()), "none") << length;
+    EXPECT_EQ(opened(path())->name(), name.substr(0, 4096)) << length;
+  }
+}
+
 TEST_F(BrickFile, TheSmallestAndTheThinnestVolumesWork) {
   for (const GridAxes& axes : {uneven_axes(2, 2, 2), uneven_axes(100, 2, 3), uneven_axes(2, 34, 33)}) {
     const ScalarGrid grid = noise(axes);

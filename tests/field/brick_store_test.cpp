@@ -104,6 +104,15 @@ TEST_F(BrickStoreTest, FallsBackToWhatIsHere) {
   EXPECT_EQ(store->ready_level(around({{120, 10, 40}}, 2), 0), 2) << "elsewhere nothing has changed";
 }
 
+TEST_F(BrickStoreTest, ALevelCoarserThanAnyIsTheCoarsest) {
+  const auto store = open(64 * byte_brick, false);
+  const std::uint64_t before = store->traffic().bricks_read;
+  for (const int level : {store->levels() - 1, store->levels(), store->levels() + 1, 1000}) {
+    ASSERT_TRUE(store->fetch(whole(grid().axes()), level).ok()) << level;
+    EXPECT_EQ(store->traffic().bricks_read, before) << "which is always there: level " << level;
+  }
+}
+
 TEST_F(BrickStoreTest, ABoxThatReachesOverABricksBorderNeedsBoth) {
   const auto store = open(64 * byte_brick, false);
   ASSERT_TRUE(store->fetch(around({{30, 10, 10}}, 0), 0).ok());

@@ -9,6 +9,7 @@
 #include <map>
 #include <string>
 
+#include "asperity/field/conversion/detail/signs.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/generators.h"
 
@@ -185,6 +186,98 @@ TEST_F(MeshConversion, ASloppyConverterIsPutRight) {
     }
     EXPECT_EQ(in_band, converted->report.points);
   }
+}
+
+/// A flood from outside around a box with another one within: what it cannot reach is inside, and the outer box's faces
+/// alone are what its distances are of.
+Result<std::vector<VoxelBlock>> flood_of_the_outer_box(const VoxelRequest& request, const Progress&) {
+  Box outer;
+  for (const Vec3f& p : request.positions) outer.include(Vec3(p.cast<double>()));
+  std::vector<TriangleMesh::Triangle> reached;
+  std::vector<std::uint32_t> number;
+  for (std::uint32_t f = 0; f < request.triangles.size(); ++f) {
+    const auto on_it = [&](std::uint32_t vertex) {
+      const Vec3 p = request.positions[vertex].cast<double>();
+      return ((p - outer.lower).cwiseAbs().minCoeff() < 1e-3) || ((p - outer.upper).cwiseAbs().minCoeff() < 1e-3);
+    };
+    const auto& t = request.triangles[f];
+    if (!on_it(t[0]) || !on_it(t[1]) || !on_it(t[2])) continue;
+    reached.push_back(t);
+    number.push_back(f);
+  }
+  std::vector<VoxelBlock> blocks;
+  const auto first = [&](int a) { return static_cast<int>(std::floor((outer.lower[a] - 3.0) / 8.0)); };
+  const auto last = [&](int a) { return static_cast<int>(std::floor((outer.upper[a] + 3.0) / 8.0)); };
+  for (int z = first(2); z <= last(2); ++z) {
+    for (int y = first(1); y <= last(1); ++y) {
+      for (int x = first(0); x <= last(0); ++x) {
+        VoxelBlock& block = blocks.emplace_back();
+        block.at = {x, y, z};
+        for (int n = 0; n < 512; ++n) {
+          const Vec3 p(8 * x + n % 8, 8 * y + n / 8 % 8, 8 * z + n / 64);
+          const bool inside = (p.array() > outer.lower.array() && p.array() < outer.upper.array()).all();
+          const Nearest found = nearest(request.positions, reached, p);
+          const bool kept = inside || found.distance < static_cast<double>(request.band_outside);
+          block.face[static_cast<std::size_t>(n)] = kept ? number[found.face] : no_index;
+          block.distance[static_cast<std::size_t>(n)] =
+              inside ? static_cast<float>(-found.distance)
+                     : std::min(static_cast<float>(found.distance), request.band_outside);
+        }
+      }
+    }
+  }
+  return blocks;
+}
+
+TEST_F(MeshConversion, WallsThatNothingReachesFromOutsideAreSwallowed) {
+  register_mesh_voxelizer(flood_of_the_outer_box);
+  const Vec3 outer(0.06, 0.05, 0.04);
+  MeshSource source = box_mesh(outer);
+  const MeshSource within = box_mesh({0.03, 0.02, 0.01});
+  source.corner_uvs.clear();
+  const auto before = static_cast<std::uint32_t>(source.positions.size());
+  source.positions.insert(source.positions.end(), within.positions.begin(), within.positions.end());
+  for (const TriangleMesh::Triangle& t : within.triangles)
+    source.triangles.push_back({t[0] + before, t[1] + before, t[2] + before});
+  ConversionSettings settings;
+  settings.rule = InsideRule::flood;
+  settings.resolution = 30;
+  settings.band_inside = infinity;
+  const auto converted = convert_mesh(index_of(std::move(source)), settings);
+  ASSERT_TRUE(converted) << converted.error().message();
+  // All through the outer box the potential is the distance from its own six sides.
+  SparseHint hint;
+  const double voxel = converted->grid.voxel();
+  for (const Vec3& p : {Vec3(0.0, 0.0, 0.003), Vec3(0.014, 0.009, 0.004), Vec3(0.002, 0.001, 0.0055),
+                        Vec3(0.0, 0.0105, 0.0), Vec3(-0.0155, 0.0, 0.0), Vec3(0.001, -0.012, -0.007)}) {
+    const double depth = (0.5 * outer - p.cwiseAbs()).minCoeff();
+    EXPECT_NEAR(converted->grid.trilinear(p, hint).value, -depth, 0.5 * voxel) << p.transpose();
+  }
+}
+
+TEST(BlockMap, AddedBlocksKnowWhatIsBesideThem) {
+  std::vector<VoxelBlock> blocks(1);
+  conversion::BlockMap map(blocks);
+  // Around in a ring, out of order, and one apart from the others.
+  for (const std::array<std::int32_t, 3>& at :
+       {std::array<std::int32_t, 3>{1, 0, 0}, {1, 1, 0}, {5, 5, 5}, {0, 1, 0}, {0, 0, -1}, {0, 1, -1}, {1, 0, -1}})
+    map.append(at, 1.0, blocks);
+  const double voxel = 1e-3;
+  conversion::for_each_node(blocks, [&](const conversion::Node& node) {
+    const Vec3 here = conversion::position_of(blocks[node.block], node.point, Vec3::Zero(), voxel);
+    for (std::uint32_t way = 0; way < 6; ++way) {
+      const Vec3 there = here + (way % 2 == 0 ? -voxel : voxel) * Vec3::Unit(way / 2);
+      const conversion::Node next = map.beside(node, way);
+      const Vec3 block = (there / (8.0 * voxel) + Vec3::Constant(1e-6)).array().floor();
+      const bool stored = std::any_of(blocks.begin(), blocks.end(), [&](const VoxelBlock& one) {
+        return Vec3(one.at[0], one.at[1], one.at[2]) == block;
+      });
+      ASSERT_EQ(next.block != no_index, stored) << there.transpose();
+      if (!stored) continue;
+      const Vec3 found = conversion::position_of(blocks[next.block], next.point, Vec3::Zero(), voxel);
+      ASSERT_LT((found - there).norm(), 1e-12);
+    }
+  });
 }
 
 TEST_F(MeshConversion, VoxelAndBandsAreKept) {

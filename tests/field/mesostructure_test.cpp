@@ -173,6 +173,52 @@ TEST(AgreementFlat, TwoFlatMapsAgreeAndAFlatHeightMapIsNamed) {
   EXPECT_TRUE(disagreement_warning(agreement).has_value());
 }
 
+TEST(AgreementFlat, EveryColumnAndEveryRowCounts) {
+  // Maps that end at their borders and lean in one column or one row alone: they are not flat, wherever that is.
+  constexpr int side = 20;
+  const auto heights = HeightMap::build({0.0F, 1e-3F, 2e-3F, 0.0F}, 2, 2, Wrap::clamp, Reconstruction::bilinear);
+  ASSERT_TRUE(heights.ok());
+  for (const bool column : {true, false}) {
+    for (int leaning = 0; leaning < side; ++leaning) {
+      Image image{side, side, 3, 8, {}};
+      for (int y = 0; y < side; ++y) {
+        for (int x = 0; x < side; ++x) {
+          const bool leans = (column ? x : y) == leaning;
+          image.samples.insert(image.samples.end(), {static_cast<std::uint16_t>(leans ? 200 : 128), 128, 255});
+        }
+      }
+      const auto normals = NormalMap::build(image, {.wrap = Wrap::clamp});
+      ASSERT_TRUE(normals.ok()) << normals.error().message();
+      EXPECT_FALSE(compare_normals(*heights, *normals, tile).normals_flat) << column << " " << leaning;
+    }
+  }
+}
+
+TEST(AgreementScale, APlaneUnderneathIsNoDisagreement) {
+  // A normal map made after the lie of the land was taken out of the heights: the same but for their mean.
+  constexpr int side = 64;
+  const auto picture = [&](double tilt) {
+    std::vector<float> heights;
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const double s = (x + 0.5) / side;
+        const double t = 1.0 - (y + 0.5) / side;
+        heights.push_back(static_cast<float>(1e-3 * (std::sin(30.0 * s) * std::cos(25.0 * t) + tilt * (s + 2.0 * t))));
+      }
+    }
+    auto map = HeightMap::build(std::move(heights), side, side, Wrap::clamp, Reconstruction::bilinear);
+    EXPECT_TRUE(map.ok());
+    return std::move(map).value();
+  };
+  const auto normals = NormalMap::build(picture(0.0), tile);
+  ASSERT_TRUE(normals.ok());
+  const NormalAgreement level = compare_normals(picture(0.0), *normals, tile);
+  const NormalAgreement tilted = compare_normals(picture(10.0), *normals, tile);
+  EXPECT_GT(level.correlation, 0.99);
+  EXPECT_NEAR(tilted.correlation, level.correlation, 0.02);
+  EXPECT_NEAR(tilted.scale, level.scale, 0.02);
+}
+
 TEST(AgreementScale, DoesNotDependOnTheUnitOfTheScene) {
   const HeightMap heights = relief(MesostructureKind::warts);
   const NormalMap normals = pictured_normals(heights, 1.0, false, GreenConvention::up);

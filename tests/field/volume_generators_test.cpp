@@ -53,6 +53,21 @@ TEST(CavityFlow, StreamsAboveAndRecirculatesBelow) {
   EXPECT_TRUE(flow.velocity({0.1, 0.03, -1e3}).allFinite());
 }
 
+TEST(CavityFlow, RollsTurnAboutTheMiddleOfTheLayer) {
+  // Nothing else flows across the stream: as much to one side above the layer's middle as to the other below it.
+  const CavityFlow flow = *CavityFlow::build({.kind = VolumeKind::cavity});
+  for (const double x : {0.05, 0.15}) {
+    for (const double y : {0.02, 0.03, 0.085}) {
+      EXPECT_NEAR(flow.velocity({x, y, 0.05}).y(), 0.0, 1e-12);
+      for (const double off : {0.002, 0.008, 0.02}) {
+        const double above = flow.velocity({x, y, 0.05 + off}).y();
+        EXPECT_NEAR(above, -flow.velocity({x, y, 0.05 - off}).y(), 1e-12);
+        EXPECT_GT(std::abs(above), 0.01);
+      }
+    }
+  }
+}
+
 TEST(CavityFlow, VorticesComeDownstreamAtHalfTheSpeed) {
   VolumeGenerator generator{.kind = VolumeKind::cavity};
   const auto vorticity = [&](double x, double time) {
@@ -247,6 +262,8 @@ TEST(VolumeGenerators, RefusesWhatCannotBe) {
   EXPECT_EQ(refusal({.kind = VolumeKind::waves, .steepness = 0.5}), "steepness");
   EXPECT_EQ(refusal({.kind = VolumeKind::gyroid, .wavelength = infinity}), "wavelength");
   EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .speed = 0.0}), "speed");
+  EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .wavelength = 0.0}), "wavelength");
+  EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .thickness = 0.0}), "thickness");
   EXPECT_EQ(refusal({.kind = VolumeKind::cavity, .strength = 1.0}), "strength");
   EXPECT_FALSE(VolumeFunction::build({.kind = VolumeKind::cavity}).ok());
 }

@@ -19,11 +19,11 @@ ScalarGrid wavy_sphere(std::uint32_t count) {
                        [](const Vec3& p) { return p.norm() + 0.0003 * std::sin(p.x() / 0.002); });
 }
 
-Scene scene_on(std::shared_ptr<const ScalarField> field) {
+Scene scene_on(std::shared_ptr<const ScalarField> field, double probe_radius = 0.0) {
   Instance instance;
   instance.name = "sphere";
   instance.surface = std::make_shared<const IsoSurface>(IsoSurface::build(std::move(field), 0.03, Inside::low).value());
-  return Scene::build({instance}, 0.0).value();
+  return Scene::build({instance}, probe_radius).value();
 }
 
 Vec3 over_sphere(double arc, double depth) {
@@ -59,6 +59,32 @@ TEST_F(BrickSurface, FetchedIsFeltBitForBitAsInMemory) {
       if (i > 0) {
         ASSERT_TRUE(from_bricks.flags.has(TickFlag::contact)) << i;
       }
+    }
+  }
+}
+
+TEST_F(BrickSurface, ABallAsksForAllThatItTouches) {
+  // Six cells of radius, in bricks of 32: what it rests on is often in another brick than its centre. The oracle has
+  // all of the file in memory.
+  ASSERT_TRUE(write_brick_file(path(), wavy_sphere(100), {}));
+  constexpr double radius = 0.006;
+  auto whole_store = BrickStore::open(path(), {std::size_t{16} << 20, false});
+  auto store = BrickStore::open(path(), {std::size_t{16} << 20, false});
+  ASSERT_TRUE(whole_store && store);
+  ASSERT_TRUE((*whole_store)->fetch(whole((*whole_store)->axes(0)), 0));
+  const Scene held = scene_on(std::make_shared<const ScalarField>(std::move(*whole_store)), radius);
+  const Scene streamed = scene_on(std::make_shared<const ScalarField>(std::move(*store)), radius);
+  ProxyState a;
+  ProxyState b;
+  for (int i = 0; i < 80; ++i) {
+    const ProbeSample probe = at(over_sphere(3e-4 * i, i == 0 ? -0.009 : 0.0008 - radius));
+    ASSERT_TRUE(fetch_volumes(streamed, b, probe));
+    const ForceSample in_memory = step(held, a, probe, Seconds(1e-3));
+    const ForceSample from_bricks = step(streamed, b, probe, Seconds(1e-3));
+    ASSERT_EQ(from_bricks.level, 0) << i;
+    ASSERT_EQ(in_memory.wrench.force, from_bricks.wrench.force) << i;
+    if (i > 0) {
+      ASSERT_TRUE(from_bricks.flags.has(TickFlag::contact)) << i;
     }
   }
 }

@@ -312,6 +312,65 @@ TEST(Change, Zooming_while_touched_changes_no_force) {
   }
 }
 
+/// A sheet with friction that draws back like a spring, in a view of its own.
+Scene rubbed_in(double zoom, const char* law) {
+  Instance instance;
+  instance.name = "test";
+  instance.surface = flat_relief(sheet(), 0.0);
+  instance.law = named(law);
+  instance.material.stiffness = stiffness;
+  instance.material.static_friction = instance.material.dynamic_friction = 0.3;
+  instance.material.friction.kind = FrictionKind::dahl;
+  instance.material.friction_named = true;
+  SceneSettings settings;
+  settings.view.zoom = zoom;
+  settings.handover = Seconds(0.0);
+  return must(Scene::build({instance}, settings));
+}
+
+TEST(Change, Scenes_that_follow_in_a_zoomed_view_are_zoomed_once) {
+  for (const char* law : {"proxy", "mesostructure", "height-field"}) {
+    ProxyState state;
+    press(rubbed_in(1.0, law), state, Vec3::Zero(), 0.0);
+    Vec3 hand(0.0, -depth, 0.0);
+    const Scene plain = rubbed_in(1.0, law);
+    for (int i = 0; i < 50; ++i) {
+      hand.x() += 2e-5;
+      touch(plain, state, hand);
+    }
+    const Vec3 before = touch(plain, state, hand).wrench.force;
+    ASSERT_LT(before.x(), -0.1) << law;
+    const double account = state.account.level();
+    for (const double zoom : {4.0, 4.0, 4.0, 1.0, 1.0}) {
+      const Vec3 after = touch(rubbed_in(zoom, law), state, hand).wrench.force;
+      EXPECT_NEAR((after - before).norm(), 0.0, 2e-3) << law << " " << zoom;
+      EXPECT_NEAR(state.account.level(), account, 1e-6) << law << " " << zoom;
+    }
+  }
+}
+
+// A plane is the same in every view: what the hand has put into its springs, friction's among them, it gets back in
+// another one as if nothing had been changed.
+TEST(Change, Zooming_under_a_moving_hand_changes_nothing_of_a_plane) {
+  for (const char* law : {"mesostructure", "height-field"}) {
+    for (const double zoom : {0.25, 4.0}) {
+      ProxyState kept;
+      ProxyState zoomed;
+      const Scene plain = rubbed_in(1.0, law);
+      const Scene other = rubbed_in(zoom, law);
+      press(plain, kept, Vec3::Zero(), 0.0);
+      press(plain, zoomed, Vec3::Zero(), 0.0);
+      for (int i = 1; i <= 60; ++i) {
+        const Vec3 hand(2e-5 * std::min(i, 60 - i), -depth, 0.0);
+        const Vec3 expected = touch(plain, kept, hand).wrench.force;
+        const Vec3 felt = touch(i < 30 ? plain : other, zoomed, hand).wrench.force;
+        ASSERT_NEAR((felt - expected).norm(), 0.0, 1e-9) << law << " " << zoom << " " << i;
+        ASSERT_NEAR(zoomed.account.level(), kept.account.level(), 1e-12) << law << " " << zoom << " " << i;
+      }
+    }
+  }
+}
+
 // Conveyors under a still hand with an empty account: friction, damping and viscosity give nothing.
 TEST(Change, A_moving_surface_drags_no_more_than_is_paid_for) {
   const MeshSurface base = sheet(0.2);

@@ -98,6 +98,23 @@ TEST(CrossUncross, FollowsTheSurfaceWhileTheProbeSlidesUnderIt) {
   EXPECT_LT(worst_direction * 57.3, 0.5);
 }
 
+TEST(CrossUncross, StaysOnTheSurfaceThatItCameThroughOverAHollow) {
+  // Half a space under z = 0 with a hollow ball in it. A probe that slides along beneath the hollow is still held to
+  // the top that it came in by, as deep as before, though the hollow's wall is nearer.
+  const auto hollow = surface_of(
+      sampled(cube(0.02, 81), [](const Vec3& p) { return std::max(p.z(), 2e-3 - (p - Vec3(0.0, 0.0, -6e-3)).norm()); }),
+      0.0);
+  Touch touch = touching(hollow);
+  constexpr double depth = 0.011;
+  touch.at(Vec3(-0.01, 0.001, 0.001));
+  for (int i = 0; i <= 200; ++i) {
+    const Vec3 p(-0.01 + 1e-4 * i, 0.001, -depth);
+    const LawForce force = touch.at(p);
+    ASSERT_TRUE(force.contact) << i;
+    ASSERT_LT((force.force - Vec3(0.0, 0.0, stiffness * depth)).norm(), 1e-3) << i;
+  }
+}
+
 TEST(CrossUncross, ForceIsContinuousWhileSliding) {
   Touch touch = touching(ball());
   touch.at(Vec3(0.0, 0.0, 0.011));

@@ -361,6 +361,40 @@ TEST(LawOfOnesOwn, ForcesThatAreNoNumbersAreNone) {
   EXPECT_FALSE(felt.flags.has(TickFlag::contact));
 }
 
+/// A spring of a stiffness of its own, which says how stiff it is and what it holds.
+struct Stiff {
+  static constexpr LawFacts facts{.name = "stiff", .title = "a spring of its own", .source = "none"};
+  double stiffness = 1000.0;
+  [[nodiscard]] LawForce force(const TouchedSurface& surface, const Material&, const Vec3& probe, const Vec3&,
+                               Seconds) const noexcept {
+    LawForce answer;
+    const FieldSample field = surface.eval(probe);
+    if (!(field.value < 0.0)) return answer;
+    answer.contact = answer.damped = true;
+    answer.normal = field.gradient.normalized();
+    answer.penetration = -field.value;
+    answer.point = probe - field.value * answer.normal;
+    answer.force = answer.spring = -stiffness * field.value * answer.normal;
+    answer.stiffness = stiffness;
+    answer.stored = 0.5 * stiffness * field.value * field.value;
+    return answer;
+  }
+};
+
+TEST(LawOfOnesOwn, AStifferSpringThanItsMaterialsIsRenderedWhereItIsSeen) {
+  // It gives back what the hand has put in: as it is seen to be so stiff, all of it is rendered on the way in and out.
+  Instance instance = instance_of(surface_of(Ball{}));
+  instance.law = Stiff{2.0 * stiffness};
+  const Scene scene = must(Scene::build({instance}, 0.0));
+  ProxyState state;
+  for (int i = -50; i <= 150; ++i) {
+    const double depth = 1e-5 * (i <= 50 ? i : 100 - i);
+    const ForceSample felt = touch(scene, state, Vec3(0.0, 0.0, 0.03 - depth));
+    ASSERT_NEAR(felt.wrench.force.z(), 2.0 * stiffness * std::max(0.0, depth), 1e-9) << i;
+    EXPECT_FALSE(felt.flags.has(TickFlag::energy_limited)) << i;
+  }
+}
+
 TEST(LawOfOnesOwn, TwoRunsAreEqualToTheBit) {
   Instance instance = instance_of(surface_of(GyroidSheet{}), Sides::both);
   instance.law = Power{};

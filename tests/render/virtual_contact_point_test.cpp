@@ -256,6 +256,25 @@ TEST(VirtualContactPoint, FrictionGrowsWithDepthAndStaysBelowOne) {
   }
 }
 
+TEST(VirtualContactPoint, DraggedFastOverABallItStaysOnTheBall) {
+  // The contact point lags by some millimetres: the straight way back to it runs through the ball.
+  const auto ball = surface_of(test::sparse_ball(voxel, 6e-3));
+  PointTouch touch{ball, with(Formulation::consistent), {}};
+  touch.material.static_friction = touch.material.dynamic_friction = 0.6;
+  touch.at(far_outside());
+  double farthest_back = 0.0;
+  for (int i = 0; i <= 60; ++i) {
+    const double angle = 0.1 * i;
+    const Vec3 out(std::sin(angle), 0.0, std::cos(angle));
+    const LawForce force = touch.at(0.028 * out);
+    ASSERT_TRUE(force.contact) << i;
+    // Stored as floats in voxels: the ball itself is known to microns.
+    ASSERT_NEAR(force.point.norm(), 0.03, 1e-5) << i;
+    farthest_back = std::max(farthest_back, (force.point - 0.03 * out).norm());
+  }
+  EXPECT_GT(farthest_back, 3e-3);
+}
+
 /// What a random walk over a ball and a box with friction must not gain.
 void expect_passive(const std::shared_ptr<const ImplicitSurface>& surface, const Vec3& centre, std::uint64_t seed) {
   Rng rng(seed);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "asperity/field/height/detail_pyramid.h"
 #include "asperity/field/height/image.h"
 #include "tests/surface/coats.h"
 
@@ -185,6 +186,27 @@ TEST(Coat, texel_size_is_the_tiles_share) {
   const TriangleMesh mesh = mesh_of(plane_grid(0.064, 0.064, 3, 3));
   EXPECT_NEAR(coat_on(mesh, wavy_map(1e-3, 64), Mapping::uv).texel_size(), 1e-3, 1e-9);
   EXPECT_NEAR(coat_on(mesh, wavy_map(1e-3, 64), Mapping::triplanar, 0.064).texel_size(), 1e-3, 1e-12);
+}
+
+TEST(Coat, what_is_laid_twice_as_large_loses_its_detail_at_twice_the_scale) {
+  // The same picture over sheets of 10 mm, the size of its tile, and of 20 mm.
+  const HeightMap map = wavy_map(1e-3, 64);
+  const Vec2 tile = Vec2::Constant(0.01);
+  DetailSettings settings;
+  settings.kind = DetailKind::low_pass;
+  const auto pyramid = std::make_shared<const DetailPyramid>(must(DetailPyramid::build(map, tile, settings)));
+  const auto maps = std::make_shared<const Mesostructure>(must(Mesostructure::build(map, tile)).with_detail(pyramid));
+  const auto level_on = [&](double side, double scale) {
+    const TriangleMesh mesh = mesh_of(plane_grid(side, side, 1, 1));
+    const Coat coat = must(Coat::build(mesh, maps, CoatSettings{Mapping::uv, Vec2::Ones(), {}}));
+    return coat.level_for(coat.frame(mesh, 0), scale, 0.0);
+  };
+  for (const double scale : {0.4e-3, 0.9e-3, 2e-3}) {
+    EXPECT_NEAR(level_on(0.01, scale), pyramid->level_of_scale(scale), 1e-12);
+    EXPECT_NEAR(level_on(0.02, 2.0 * scale), level_on(0.01, scale), 1e-12);
+    EXPECT_NEAR(level_on(0.005, 0.5 * scale), level_on(0.01, scale), 1e-12);
+    EXPECT_GT(level_on(0.01, scale), level_on(0.02, scale) + 0.5);
+  }
 }
 
 TEST(Coat, bounds_hold_every_sample) {

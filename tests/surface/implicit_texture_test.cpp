@@ -493,6 +493,63 @@ TEST(Textured, RedistancingMakesItADistanceAndNormalisingComesNearer) {
   }
 }
 
+TEST(Textured, NormalisingChangesWhatIsNearAndLeavesWhatIsFar) {
+  const auto grid = plane(8.0 * voxel, 10.0 * voxel);
+  const PointHeight height = wave(voxel, 8.0 * voxel);
+  const SparseSource before = must_texture(*grid, height, Redistancing::none).grid.source();
+  const SparseSource after = must_texture(*grid, height, Redistancing::normalised).grid.source();
+  int far = 0;
+  int near = 0;
+  for (std::size_t b = 0; b < before.blocks.size(); ++b) {
+    for (std::size_t n = 0; n < SparseBlock::points; ++n) {
+      const auto was = static_cast<double>(before.blocks[b].value[n]);
+      const auto is = static_cast<double>(after.blocks[b].value[n]);
+      ASSERT_LE(std::abs(is), std::abs(was) * (1.0 + 1e-6)) << "its slope is 1 or more";
+      if (std::abs(was) >= 4.0 * voxel) {
+        ++far;
+        ASSERT_EQ(is, was) << was / voxel;
+      } else if (std::abs(was) > 0.1 * voxel && std::abs(is) < 0.95 * std::abs(was)) {
+        ++near;
+      }
+    }
+  }
+  EXPECT_GT(far, 1000);
+  EXPECT_GT(near, 1000);
+}
+
+TEST(Textured, InAWideBandTheDistanceTurnsIntoThePotential) {
+  // As far as eight voxels; what is stored is the one near the surface and the other near the end of that.
+  const auto grid = plane(16.0 * voxel, 12.0 * voxel, 4.0 * voxel);
+  const PointHeight height = wave(voxel, 16.0 * voxel);
+  const SparseGrid potential = must_texture(*grid, height, Redistancing::none).grid;
+  const SparseGrid stored = must_texture(*grid, height, Redistancing::redistanced).grid;
+  const auto field = field_of(potential);
+  CellCache cells;
+  SparseHint hint;
+  int near = 0;
+  int far = 0;
+  for (int x = -6; x <= 6; ++x) {
+    for (int z = -10; z <= 10; ++z) {
+      const Vec3 p = voxel * Vec3(x, 0.0, z);
+      const double own = std::abs(potential.trilinear(p, hint).value);
+      const Foot foot = surface_of(*field, cells).nearest(p, 12.0 * voxel);
+      ASSERT_TRUE(foot.found());
+      if (own - foot.distance < 0.05 * voxel) continue;
+      const double is = std::abs(stored.trilinear(p, hint).value);
+      const double share = (is - foot.distance) / (own - foot.distance);
+      if (foot.distance < 4.0 * voxel) {
+        ++near;
+        EXPECT_LT(share, 0.1) << p.transpose() / voxel;
+      } else if (foot.distance > 7.5 * voxel) {
+        ++far;
+        EXPECT_GT(share, 0.8) << p.transpose() / voxel;
+      }
+    }
+  }
+  EXPECT_GT(near, 10);
+  EXPECT_GT(far, 10);
+}
+
 TEST(Textured, AFlatTextureMovesTheSurfaceAndKeepsTheDistance) {
   const auto grid = ball();
   const TexturedPotential result = must_texture(*grid, constant_height(voxel), Redistancing::redistanced);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/geometry/random_meshes.h"
+#include "tests/surface/folded.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::shell_test {
@@ -369,6 +370,57 @@ TEST(T6_injectivity, vertices_that_no_direction_suits_are_named_and_bear_no_reli
       EXPECT_EQ(surface->height(surface->frame(face), whole_triangle[k].x(), whole_triangle[k].y()).height, 0.0)
           << face;
     }
+  }
+}
+
+TEST(T6_injectivity, a_direction_that_sees_all_faces_is_found_where_there_is_one) {
+  // A knife's edge: a broad face and a narrow one that is folded back behind it. What the broad one weighs hides the
+  // narrow one from the vertex normal, but between the two lies a direction that sees both.
+  for (const double opening : {20.0, 30.0, 45.0}) {
+    const double angle = degrees(opening);
+    MeshSource knife;
+    knife.positions = {{0.0, 0.0, 0.0},
+                       {0.01, 0.0, 0.0},
+                       {0.005, 0.05, 0.0},
+                       {0.005, 4e-4 * std::cos(angle), -4e-4 * std::sin(angle)}};
+    knife.triangles = {{0, 1, 2}, {1, 0, 3}};
+    const TriangleMesh mesh = mesh_of(knife);
+    const auto seen = [&](const Vec3& direction) {
+      return std::min(mesh.face_normal(0).dot(direction), mesh.face_normal(1).dot(direction)) / direction.norm();
+    };
+    const Shell shell = Shell::build(mesh);
+    for (std::uint32_t vertex = 0; vertex < 2; ++vertex) {
+      ASSERT_LT(seen(mesh.vertex_normal(vertex)), 0.0) << opening;
+      const double best = seen(mesh.face_normal(0) + mesh.face_normal(1));
+      EXPECT_GT(seen(shell.directions[vertex].cast<double>()), 0.9 * best) << opening;
+    }
+    EXPECT_TRUE(shell.blind_vertices.empty()) << opening;
+  }
+}
+
+TEST(T6_injectivity, other_directions_are_taken_however_little_does_not_fit) {
+  for (const int kind : {1, 3, 4}) {
+    // Sunk into what is convex, raised in what has valleys.
+    const double side = kind == 4 ? 1.0 : -1.0;
+    const auto report_at = [&](double height) {
+      TriangleMesh mesh = mesh_of(base_of_kind(kind, 5));
+      Coat coat =
+          coat_on(mesh, between(std::min(0.0, side * height), std::max(0.0, side * height)), Mapping::triplanar);
+      return must(ReliefSurface::build(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat),
+                                       ReliefSettings{ShellDirections::least_squares, OnOverlap::cure}))
+          .report();
+    };
+    double fits = 1e-3;
+    double folds = 0.05;
+    while (folds > fits * 1.0001) {
+      const double middle = 0.5 * (fits + folds);
+      (report_at(middle).faces_at_fault.empty() ? fits : folds) = middle;
+    }
+    const ReliefReport report = report_at(1.002 * fits);
+    EXPECT_GT(report.fitting_share, 0.99) << kind;
+    EXPECT_LT(report.fitting_share, 1.0) << kind;
+    EXPECT_TRUE(report.directions_relaxed) << kind;
+    EXPECT_EQ(report.lowered_vertices, 0U) << kind;
   }
 }
 

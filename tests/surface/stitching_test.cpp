@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 
+#include "tests/surface/folded.h"
 #include "tests/surface/reliefs.h"
 
 namespace asperity::stitching_test {
@@ -271,6 +272,39 @@ TEST(StitchingFolds, keep_leaves_the_folds_of_a_bare_mesh_and_round_rounds_them)
   EXPECT_GT(highest, 1e-5) << "valleys are filled";
 }
 
+TEST(StitchingFolds, the_bound_on_rounding_holds_for_round_folds_and_leaves_fillets_alone) {
+  const double bound = 1e-5;
+  const auto folded = [&](FoldMode folds, Mapping mapping) {
+    Stitching stitching = joined(Blend::quintic, folds, 1.0 / 3.0);
+    stitching.most_rounding = bound;
+    stitching.fillet_radius = 0.5e-3;
+    return relief_on(mesh_of(valley(degrees(90.0), 0.02)), {tiled(flat_map(0.0))}, coat_settings(mapping, stitching));
+  };
+  const auto rounded = folded(FoldMode::round, Mapping::per_face);
+  double longest = 0.0;
+  for (const Vec3f& direction : rounded->shell().directions)
+    longest = std::max(longest, static_cast<double>(direction.norm()));
+  // Searches look no farther than the surface may have been moved.
+  EXPECT_LE(rounded->reach(), longest * bound * (1.0 + 1e-9));
+  double most = 0.0;
+  for (std::uint32_t face = 0; face < rounded->base().mesh().triangles().size(); ++face) {
+    for (double u = 0.0; u <= 1.0; u += 0.02) {
+      for (double v = 0.0; u + v <= 1.0; v += 0.02)
+        most = std::max(most, std::abs(rounded->height(rounded->frame(face), u, v).height));
+    }
+  }
+  EXPECT_NEAR(most, bound, 1e-9) << "and that is as far as it is";
+  // A ball of 0.5 mm in the fold rests 0.21 mm above it: met there, far above where rounding would have to end.
+  const auto fillet = folded(FoldMode::fillet, Mapping::triplanar);
+  SurfaceCache cache;
+  for (const double x : {0.05e-3, 0.2e-3, -0.3e-3}) {
+    const Segment down{Vec3(x, 1e-3, 5e-3), Vec3(x, 1e-3, -1e-3)};
+    const SweptHit hit = fillet->view(cache).first_touch(down, Sides::front);
+    ASSERT_TRUE(hit.hit) << x;
+    EXPECT_LT(off_fillet(down.from + hit.t * (down.to - down.from), degrees(90.0), 0.0, 0.5e-3), 1e-6) << x;
+  }
+}
+
 /// A derivative by central differences of fourth order; nothing where it has not converged (across a texel's line).
 std::optional<double> derivative(const std::function<double(double)>& f, double step, double scale) {
   const auto of = [&](double h) { return (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h); };
@@ -350,6 +384,16 @@ TEST(T8_gradients, lowered_heights_with_their_second_derivatives) {
   ASSERT_GT(plain->report().lowered_vertices, 0U);
   ASSERT_GT(patched->report().lowered_vertices, 0U);
   expect_first_derivatives(*plain, rng, true, "lowered");
+  // Unlike faces are lowered by unlike shares: those have slopes of their own.
+  const auto uneven =
+      relief_on(mesh_of(base_of_kind(1, 5)), {tiled(wavy_map(0.02))}, coat_settings(Mapping::triplanar, {}));
+  double steepest = 0.0;
+  for (std::uint32_t face = 0; face < uneven->base().mesh().triangles().size(); ++face) {
+    const ReliefFrame frame = uneven->frame(face);
+    steepest = std::max({steepest, std::abs(frame.share_u), std::abs(frame.share_v)});
+  }
+  ASSERT_GT(steepest, 0.1);
+  expect_first_derivatives(*uneven, rng, true, "lowered by unlike shares");
   expect_first_derivatives(*patched, rng, false, "lowered and stitched");
 }
 
