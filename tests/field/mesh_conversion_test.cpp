@@ -338,5 +338,22 @@ TEST_F(MeshConversion, ABandFarWiderThanTheMeshIsRefusedBeforeItIsMade) {
   EXPECT_EQ(converted.error().place, "voxel");
 }
 
+TEST_F(MeshConversion, AThinBandAroundALargeSurfaceIsRefusedBeforeItIsMade) {
+  register_mesh_voxelizer([](const VoxelRequest&, const Progress&) -> Result<std::vector<VoxelBlock>> {
+    ADD_FAILURE() << "nothing may be made";
+    return std::vector<VoxelBlock>{};
+  });
+  ConversionSettings settings;
+  settings.voxel = 1e-4;
+  settings.band_outside = settings.band_inside = 3e-4;
+  // Every square of 8 x 8 voxels of the surface takes a block of 512 floats or more.
+  const double squares = 2.0 * (0.1 * 0.06 + 0.06 * 0.04 + 0.04 * 0.1) / (8e-4 * 8e-4);
+  settings.most_bytes = static_cast<std::size_t>(0.45 * squares * 512.0 * sizeof(float));
+  const auto converted = convert_mesh(box_, settings);
+  ASSERT_FALSE(converted);
+  EXPECT_EQ(converted.error().code, ErrorCode::too_large);
+  EXPECT_EQ(converted.error().place, "voxel");
+}
+
 }  // namespace
 }  // namespace asperity::mesh_conversion_test

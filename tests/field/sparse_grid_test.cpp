@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "asperity/field/volume/scalar_field.h"
@@ -157,6 +158,26 @@ INSTANTIATE_TEST_SUITE_P(Both, EveryReconstruction,
                          [](const auto& test) {
                            return test.param == CellReconstruction::smooth ? "smooth" : "trilinear";
                          });
+
+TEST(SparseGrid, TheLeastAndTheMostAreFoundInWhicheverBrickTheyAre) {
+  SparseSource source = test::sparse_source(wave, test::cube(0.001), voxel, 0.041, 0.041);
+  // Two bricks along each axis.
+  std::erase_if(source.blocks, [](const SparseBlock& block) {
+    return std::any_of(block.at.begin(), block.at.end(), [](std::int32_t at) { return at < 0 || at > 1; });
+  });
+  ASSERT_EQ(source.blocks.size(), 8U);
+  const std::size_t middle = SparseBlock::index(4, 4, 4);
+  for (std::size_t b = 0; b < source.blocks.size(); ++b) {
+    // The wave itself stays between -0.04 and 0.04.
+    float& value = source.blocks[b].value[middle];
+    const float own = value;
+    value = 0.045F;
+    EXPECT_EQ(SparseGrid::build(source).value().highest(), 0.045F) << b;
+    value = -0.045F;
+    EXPECT_EQ(SparseGrid::build(source).value().lowest(), -0.045F) << b;
+    value = own;
+  }
+}
 
 TEST(SparseGrid, GoesThroughItsSourceUnchanged) {
   SparseSource source =

@@ -311,6 +311,19 @@ TEST(Dahl, FollowsItsClosedFormAtAnyStep) {
   }
 }
 
+TEST(Dahl, FollowsItsClosedFormAtStepsTooSmallForAnExponential) {
+  // F_c (1 - exp(-K x / F_c)), to rounding: steps of less than 1e-4 F_c / K, and a little more.
+  const double limit = 0.4 * push;
+  for (const int steps : {10500, 9500}) {
+    FrictionRig rig = rig_of(law_of(FrictionKind::dahl), 0.5, 0.4);
+    const double far = limit / rig.contact.stiffness;
+    for (int n = 1; n <= steps; ++n) {
+      const double force = -rig.move(Vec3(far / steps, 0.0, 0.0)).x();
+      ASSERT_NEAR(force / limit, 1.0 - std::exp(-static_cast<double>(n) / steps), 1e-11) << n << " of " << steps;
+    }
+  }
+}
+
 TEST(HaywardArmstrong, IsASpringWithinItsAdhesionAndReachesTheSlidingForce) {
   FrictionLaw law = law_of(FrictionKind::hayward_armstrong);
   law.adhesion = 0.4;

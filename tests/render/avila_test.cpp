@@ -193,6 +193,19 @@ TEST(AvilaLiteral, PushesWhoeverStartsInTheLayer) {
   EXPECT_FALSE(touch.at(Vec3(0.0001, 0.0, 0.0)).contact);
 }
 
+TEST(AvilaLiteral, TellsHowFarItIsToTheThresholdAndWhereThatIs) {
+  // The field is 100 or -100 a metre along x: its threshold lies in the plane x = 0, whose outside is x > 0.
+  for (const Inside inside : {Inside::low, Inside::high}) {
+    Touch touch = wall(inside == Inside::low ? 100.0 : -100.0, with(Formulation::literal, 0.1), inside);
+    for (const double depth : {0.1e-3, 0.5e-3, 0.9e-3}) {
+      const LawForce force = touch.at(Vec3(-depth, 0.002, -0.001));
+      ASSERT_TRUE(force.contact);
+      EXPECT_NEAR(force.penetration, depth, 1e-8);
+      EXPECT_LT((force.point - Vec3(0.0, 0.002, -0.001)).norm(), 1e-8);
+    }
+  }
+}
+
 // --- options ---
 
 TEST(AvilaLaw, NamesAndOptions) {

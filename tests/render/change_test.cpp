@@ -406,6 +406,38 @@ TEST(Change, A_moving_surface_drags_no_more_than_is_paid_for) {
   }
 }
 
+TEST(Change, A_belt_whose_drag_is_cut_says_so) {
+  // Friction would push a hand on that is led along with a belt but slower, and no one pays for that; it holds one back
+  // that is led faster.
+  Instance instance;
+  instance.name = "belt";
+  instance.surface = flat_relief(sheet(0.2), 0.0);
+  instance.law = named("mesostructure");
+  instance.material.stiffness = stiffness;
+  instance.material.static_friction = instance.material.dynamic_friction = 0.5;
+  instance.material.friction.kind = FrictionKind::dahl;
+  instance.material.friction_named = true;
+  instance.motion.velocity.linear = Vec3(0.05, 0.0, 0.0);
+  instance.motion.horizon = Seconds(10.0);
+  const Scene scene = must(Scene::build({instance}, SceneSettings{}));
+  for (const double speed : {0.03, 0.08}) {
+    ProxyState state;
+    for (int i = 0; i < 400; ++i) {
+      const double time = 1e-3 * i;
+      const ForceSample felt = at_time(scene, state, Vec3(speed * time, i < 100 ? 2e-3 - 3e-5 * i : -1e-3, 0.0), time);
+      if (i < 200) continue;
+      const double friction = 0.5 * felt.wrench.force.y();
+      ASSERT_NEAR(friction, 0.5 * stiffness * 1e-3, 1e-6);
+      if (speed < 0.05) {
+        ASSERT_LT(felt.wrench.force.x(), 0.5 * friction) << i;
+      } else {
+        ASSERT_NEAR(felt.wrench.force.x(), -friction, 1e-3 * friction) << i;
+      }
+      ASSERT_EQ(felt.flags.has(TickFlag::energy_limited), speed < 0.05) << i;
+    }
+  }
+}
+
 TEST(Change, A_time_that_is_no_number_is_refused) {
   const Scene scene = scene_with(flat_relief(sheet(), 0.0));
   ProxyState state;

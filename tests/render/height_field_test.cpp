@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
+
 #include "tests/render/fixtures.h"
 
 namespace asperity::height_field_test {
@@ -232,6 +234,45 @@ TEST(A2_two_prisms, beside_a_concave_edge_the_printed_force_jumps_however_short_
   const Scene proxy = scene_of(coated(valley(slope), flat_map(high), Mapping::per_face), ProxyLaw{});
   EXPECT_LT(largest_jump(slide(proxy, line(Vec3(-2.5e-7, 3e-3, z), Vec3(2.5e-7, 3e-3, z), 5), Vec3(0, 3e-3, 0.02))),
             1e-3 * expected);
+}
+
+TEST(A2_two_prisms, of_faces_that_are_equally_deep_the_first_pushes) {
+  // Over a plane's inner vertices all faces around are.
+  for (const bool turned : {false, true}) {
+    MeshSource source = plane_grid(0.04, 0.04, 4, 4);
+    if (turned) std::reverse(source.triangles.begin(), source.triangles.end());
+    const auto triangles = source.triangles;
+    const auto positions = source.positions;
+    const Scene scene = scene_of(coated(std::move(source), flat_map(height), Mapping::uv), printed);
+    for (std::uint32_t vertex = 0; vertex < positions.size(); ++vertex) {
+      const Vec3& p = positions[vertex];
+      if (std::max(std::abs(p.x()), std::abs(p.y())) > 0.015) continue;
+      std::uint32_t first = 0;
+      while (std::find(triangles[first].begin(), triangles[first].end(), vertex) == triangles[first].end()) ++first;
+      const ForceSample felt = poke(scene, p + Vec3(0.0, 0.0, 2e-3), p + Vec3(0.0, 0.0, 0.5 * height));
+      EXPECT_NEAR(felt.wrench.force.z(), 0.5 * stiffness * height, 1e-6);
+      EXPECT_EQ(felt.contact.element, first) << p.transpose();
+    }
+  }
+}
+
+TEST(A2_two_prisms, the_deeper_face_pushes_whichever_comes_first) {
+  const double slope = 0.9;
+  const double high = 4e-3;
+  MeshSource source = valley(slope);
+  for (const bool turned : {false, true}) {
+    if (turned) std::reverse(source.triangles.begin(), source.triangles.end());
+    const Scene scene = scene_of(coated(source, flat_map(high), Mapping::per_face), printed);
+    for (const double x : {-0.2e-3, 0.2e-3}) {
+      for (const double y : {-4e-3, 3e-3}) {
+        const Vec3 p(x, y, 3e-3);
+        // Of the two planes it is nearer to the one on its own side.
+        const Vec3 normal(x < 0.0 ? std::sin(slope) : -std::sin(slope), 0.0, std::cos(slope));
+        const Vec3 expected = stiffness * (high - normal.dot(p)) * normal;
+        EXPECT_LT((poke(scene, p, p).wrench.force - expected).norm(), 1e-5) << p.transpose();
+      }
+    }
+  }
 }
 
 TEST(H_neg, a_groove_is_felt_by_the_printed_form_that_takes_heights_below_zero) {

@@ -195,6 +195,28 @@ TEST(Magnetic, FrictionIsThatOfTheVirtualContactPointAndEndsAtTheSurface) {
   }
 }
 
+TEST(Magnetic, WithFrictionTheSpringStoresTheWorkOfTheWayIn) {
+  for (const double friction : {0.0, 0.6}) {
+    MagnetTouch touch = magnet(Formulation::consistent);
+    touch.material.static_friction = touch.material.dynamic_friction = friction;
+    touch.at(far_outside());
+    Vec3 last = over_the_top(1.01 * band);
+    Vec3 force = touch.at(last).force;
+    double spent = 0.0;
+    // Straight down, so that nothing is dragged: what the hand spent is all there, below what it was drawn with.
+    for (const Vec3& p : test::line(last, over_the_top(-3e-3), 8000)) {
+      const LawForce now = touch.at(p);
+      spent -= 0.5 * (force + now.force).dot(p - last);
+      last = p;
+      force = now.force;
+      if (!now.contact) continue;
+      ASSERT_TRUE(now.stored);
+      ASSERT_NEAR(*now.stored, spent, 1e-7) << p.z() - half << " " << friction;
+    }
+    EXPECT_GT(spent, 2e-3);
+  }
+}
+
 TEST(Magnetic, WhoStartsInsideIsNotPushedByOursUntilItHasBeenOutside) {
   MagnetTouch ours = magnet(Formulation::consistent);
   EXPECT_FALSE(ours.at(over_the_top(-1e-3)).contact);

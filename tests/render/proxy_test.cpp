@@ -5,7 +5,9 @@
 
 #include <cstddef>
 #include <cstring>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "tests/render/fixtures.h"
 #include "tests/surface/reliefs.h"
@@ -389,6 +391,19 @@ TEST(ProxyEnergy, a_relief_that_rises_over_a_resting_probe_gives_no_more_than_wa
   }
   EXPECT_GT(most, 0.0);
   EXPECT_LE(most, stored + account + 1e-12);
+}
+
+// ---- what a tick remembers
+
+TEST(ProxyCache, each_instance_has_one_of_its_own_until_there_is_no_room) {
+  ProxyCache cache;
+  std::vector<SurfaceCache*> own;
+  for (std::uint32_t i = 0; i < most_contacts; ++i) own.push_back(&cache.of(7 * i));
+  EXPECT_EQ(std::set<SurfaceCache*>(own.begin(), own.end()).size(), own.size());
+  for (std::uint32_t i = most_contacts; i-- > 0;) EXPECT_EQ(&cache.of(7 * i), own[i]) << i;
+  // One more takes that of the one that was not asked for longest: now the last.
+  EXPECT_EQ(&cache.of(7 * most_contacts), own.back());
+  for (std::uint32_t i = 0; i + 1 < most_contacts; ++i) EXPECT_EQ(&cache.of(7 * i), own[i]) << i;
 }
 
 }  // namespace

@@ -213,6 +213,63 @@ TEST(Closing, the_report_counts_what_the_picture_shows) {
   EXPECT_NE(report.summary().find("face " + std::to_string(report.largest_face)), std::string::npos);
 }
 
+TEST(Closing, the_report_counts_the_texels_over_faces_and_those_that_rose) {
+  const Closed result = closed(coated(valley(degrees(90.0), 6e-3), flat_map(0.3e-3), Mapping::triplanar), 2e-3, 24);
+  const ReliefAtlas& atlas = result.maps.atlas;
+  const ClosingReport& report = result.maps.report;
+  ASSERT_EQ(report.unsettled_texels, 0U);
+  const TriangleMesh& mesh = result.open->base().mesh();
+  std::size_t over = 0;
+  std::size_t risen = 0;
+  double area = 0.0;
+  double changed = 0.0;
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    // Centres of texels within the face's triangle of the picture.
+    const auto corner = [&](std::size_t k) { return Vec2(atlas.corner_uvs[face][k].cast<double>()); };
+    Eigen::Matrix2d edges;
+    edges << corner(1) - corner(0), corner(2) - corner(0);
+    std::size_t over_face = 0;
+    std::size_t risen_face = 0;
+    for (int y = 0; y < atlas.height; ++y) {
+      for (int x = 0; x < atlas.width; ++x) {
+        const Vec2 centre((x + 0.5) / atlas.width, 1.0 - (y + 0.5) / atlas.height);
+        const Vec2 uv = edges.inverse() * (centre - corner(0));
+        if (std::min({uv.x(), uv.y(), 1.0 - uv.sum()}) < -1e-4) continue;
+        ++over_face;
+        const auto at = static_cast<std::size_t>(y * atlas.width + x);
+        if (static_cast<double>(result.maps.rise[at]) > report.tolerance) ++risen_face;
+      }
+    }
+    const auto [a, b, c] = mesh.corners(face);
+    const double own = 0.5 * (b - a).cross(c - a).norm();
+    area += own;
+    changed += own * static_cast<double>(risen_face) / static_cast<double>(over_face);
+    over += over_face;
+    risen += risen_face;
+  }
+  EXPECT_GT(risen, 100U);
+  EXPECT_EQ(report.texels, over);
+  EXPECT_EQ(report.changed_texels, risen);
+  EXPECT_NEAR(report.changed_share, changed / area, 1e-12);
+}
+
+TEST(Closing, what_is_worn_keeps_directions_that_were_relaxed_on_purpose) {
+  ReliefSettings relaxed;
+  relaxed.directions = ShellDirections::relaxed;
+  TriangleMesh mesh = mesh_of(icosphere(1, 0.02));
+  for (const ReliefSettings& settings : {ReliefSettings{}, relaxed}) {
+    // Low enough for the other directions as well.
+    Coat coat = coat_on(mesh, wavy_map(0.05e-3, 16), Mapping::triplanar, 0.02);
+    const ReliefSurface open =
+        must(ReliefSurface::build(MeshSurface(TriangleIndex::build(mesh)), std::move(coat), settings));
+    ASSERT_TRUE(open.report().fits());
+    const auto worn = wear_closed(open, must(close_relief(open, {1e-3, 8})));
+    ASSERT_TRUE(worn) << worn.error().message();
+    EXPECT_EQ((*worn)->report().directions_relaxed, settings.directions == ShellDirections::relaxed);
+    EXPECT_EQ((*worn)->shell().directions, open.shell().directions);
+  }
+}
+
 void expect_refused(const ClosingSettings& settings, ErrorCode code, std::string_view place) {
   static const auto open = coated(valley(degrees(90.0), 5e-3), flat_map(0.0), Mapping::triplanar);
   const auto answer = close_relief(*open, settings);

@@ -5,6 +5,7 @@
 
 #include "asperity/field/height/detail_pyramid.h"
 #include "asperity/field/height/image.h"
+#include "asperity/surface/material_maps.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::coat_test {
@@ -206,6 +207,36 @@ TEST(Coat, what_is_laid_twice_as_large_loses_its_detail_at_twice_the_scale) {
     EXPECT_NEAR(level_on(0.02, 2.0 * scale), level_on(0.01, scale), 1e-12);
     EXPECT_NEAR(level_on(0.005, 0.5 * scale), level_on(0.01, scale), 1e-12);
     EXPECT_GT(level_on(0.01, scale), level_on(0.02, scale) + 0.5);
+  }
+}
+
+TEST(Coat, materials_change_by_their_slopes_on_projected_and_on_laid_maps) {
+  // The base's normals turn within each face, and with them the weights of the three projections.
+  const TriangleMesh mesh = mesh_of(icosphere(1, 0.02));
+  MaterialMaps::Parts parts;
+  parts.channels[0] = std::make_shared<const HeightMap>(map_of(32, [](double s, double t) {
+    return 800.0 + 300.0 * std::sin(2.0 * std::numbers::pi * s) * std::cos(2.0 * std::numbers::pi * (s + t));
+  }));
+  const auto materials = std::make_shared<const MaterialMaps>(must(MaterialMaps::build(std::move(parts))));
+  for (const Mapping mapping : {Mapping::triplanar, Mapping::per_face}) {
+    CoatParts of;
+    of.maps.push_back(tiled(flat_map(0.0), 0.03));
+    of.materials = materials;
+    CoatSettings settings;
+    settings.mapping = mapping;
+    const Coat coat = must(Coat::build(mesh, std::move(of), settings));
+    Rng rng(23);
+    for (int i = 0; i < 500; ++i) {
+      const CoatFrame frame = coat.frame(mesh, random_face(rng, mesh));
+      const Vec3 b = random_barycentric(rng, 0.01);
+      const auto value = [&](double u, double v) { return coat.material(frame, u, v).value[0]; };
+      constexpr double step = 1e-6;
+      const Vec2 slope = coat.material(frame, b[1], b[2]).slope[0];
+      const double by_u = (value(b[1] + step, b[2]) - value(b[1] - step, b[2])) / (2.0 * step);
+      const double by_v = (value(b[1], b[2] + step) - value(b[1], b[2] - step)) / (2.0 * step);
+      ASSERT_NEAR(slope.x(), by_u, 0.05) << to_string(mapping) << i;
+      ASSERT_NEAR(slope.y(), by_v, 0.05) << to_string(mapping) << i;
+    }
   }
 }
 

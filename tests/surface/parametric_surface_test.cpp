@@ -441,6 +441,24 @@ TEST(ParametricSurface, BoundsOfWhatHasNoFormulaAreAtMostTwiceWhatIsThere) {
   EXPECT_LE(s.limits().slope_u, 2.0 * steepest);
 }
 
+TEST(ParametricSurface, GrainFollowsTheShortestWaveAsItLiesOnTheSurface) {
+  // Around the axis waves are shortest where the surface is nearest to it: within the torus. Those of a sphere run
+  // along its meridians and are as long at the poles as anywhere.
+  for (const ParametricShape shape : {ParametricShape::sphere, ParametricShape::torus}) {
+    for (const double count : {40.0, 160.0}) {
+      ParametricSettings s = settings_of(shape, true);
+      const bool sphere = shape == ParametricShape::sphere;
+      s.features = {grating(1e-6, 2.0 * pi * s.radius / count, sphere ? 0.5 * pi : 0.0)};
+      const double shortest = 2.0 * pi * (sphere ? s.radius : s.radius - s.tube) / count;
+      const ParametricSurface surface = ParametricSurface::build(s).value();
+      EXPECT_LE(surface.grain(), 0.1 * shortest) << to_string(shape);
+      if (count > 100.0) {
+        EXPECT_GE(surface.grain(), 0.05 * shortest) << to_string(shape);
+      }
+    }
+  }
+}
+
 TEST(ParametricSurface, BallsStopAtTheirRadius) {
   Rng rng(17);
   const ParametricSurface sphere = surface_of(ParametricShape::sphere);
