@@ -64,6 +64,20 @@ struct Superquadric {
   [[nodiscard]] double grain() const { return 0.005; }
 };
 
+/// |x/a|^2 + |y/b|^2 + |z/c|^2 = 1, by the square root: no distance.
+struct Ellipsoid {
+  Vec3 size = Vec3(0.03, 0.02, 0.01);
+  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept {
+    FieldSample sample;
+    const Vec3 q = p.cwiseQuotient(size);
+    const double norm = q.norm();
+    sample.value = size.minCoeff() * (norm - 1.0);
+    if (norm > 0.0) sample.gradient = size.minCoeff() / norm * q.cwiseQuotient(size);
+    return sample;
+  }
+  [[nodiscard]] Box bounds() const { return {-size, size}; }
+};
+
 /// The gyroid itself, a sheet that goes on beyond its box.
 struct GyroidSheet {
   double wave = 6.283185307179586 / 0.02;

@@ -128,6 +128,26 @@ RC_GTEST_PROP(CustomSurface, FeetAreOnTheSurfaceAndSquareToIt, ()) {
   RC_ASSERT(std::abs(foot.distance - std::abs(from_ring - field.tube)) < 2.0 * surface.skin());
 }
 
+TEST(CustomSurface, WithinAnEllipsoidTheNearestPlaceIsFoundBesideTheSlopesOwn) {
+  // From a place of the longest axis the slope leads to its end, which is the farthest place around. The nearest ones
+  // lie above and below, where the normal leads through it: (x - d) / (x / a^2) = z / (z / c^2).
+  const Ellipsoid field;
+  const CustomSurface surface = made(field);
+  const double a = field.size.x();
+  const double c = field.size.z();
+  for (const double d : {0.002, 0.005, 0.01, 0.015, 0.02}) {
+    for (const double end : {-1.0, 1.0}) {
+      const Vec3 p(end * d, 0.0, 0.0);
+      const double distance = c * std::sqrt(1.0 - d * d / (a * a - c * c));
+      ASSERT_LT(distance, a - d);
+      const Foot foot = surface.view().nearest(p, infinity);
+      ASSERT_TRUE(foot.found());
+      EXPECT_NEAR(foot.distance, distance, surface.skin()) << d;
+      EXPECT_NEAR(foot.point.x(), end * a * a * d / (a * a - c * c), 1e-2 * a) << d;
+    }
+  }
+}
+
 TEST(CustomSurface, BallInACornerTouchesBothWalls) {
   const CustomSurface corner = made(Corner{});
   // On either side of the middle the wall there is the nearer one.
