@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "asperity/core/rng.h"
 #include "asperity/surface/parametric/view.h"
 #include "tests/surface/balls.h"
 #include "tests/surface/custom_fields.h"
@@ -172,6 +173,21 @@ TEST(CustomSurface, MovingBallStopsARadiusBefore) {
   EXPECT_NEAR(0.1 * (1.0 - t), z, 1e-6);
   EXPECT_FALSE(ball.view().first_touch({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, Sides::front).hit);
   EXPECT_TRUE(ball.view().first_touch({Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.1)}, Sides::both).hit);
+}
+
+TEST(CustomSurface, WhatIsTouchedLiesOnTheSurfaceWhereTheWayEndsBeforeIt) {
+  const Superquadric field;
+  const CustomSurface surface = made(field);
+  Rng rng(3);
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 from = 0.06 * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)).normalized();
+    const Vec3 to = 0.01 * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    const SweptHit hit = surface.view().first_touch({from, to}, Sides::front);
+    ASSERT_TRUE(hit.hit);
+    // Far nearer than what counts as touched.
+    EXPECT_LT(std::abs(field.eval(hit.contact.point).value), 1e-2 * surface.skin()) << i;
+    EXPECT_NEAR(hit.contact.distance, (from + hit.t * (to - from) - hit.contact.point).norm(), 1e-2 * surface.skin());
+  }
 }
 
 /// A ball that answers its nearest point and its first touch itself, and says so by its element.
