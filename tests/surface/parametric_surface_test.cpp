@@ -129,6 +129,13 @@ const std::vector<ParametricSurface>& plain_and_featured() {
   return all;
 }
 
+TEST(ParametricSurface, APlainShapeTellsNoHeight) {
+  for (const ParametricShape shape : shapes) {
+    const ParametricSurface s = surface_of(shape);
+    for (const double share : {0.1, 0.5, 0.9}) EXPECT_EQ(s.jet(place_in(s, share, 1.0 - share)).height, 0.0);
+  }
+}
+
 RC_GTEST_PROP(ParametricSurface, T8_derivatives_are_those_of_the_points, ()) {
   const double a = 0.05 + 0.9e-4 * *rc::gen::inRange(0, 10000);
   const double b = 0.05 + 0.9e-4 * *rc::gen::inRange(0, 10000);
