@@ -8,6 +8,7 @@
 #include "asperity/field/mesostructure/mesostructure.h"
 #include "asperity/field/mesostructure/solid.h"
 #include "asperity/geometry/mesh.h"
+#include "asperity/surface/height_form.h"
 #include "asperity/surface/material_maps.h"
 #include "asperity/surface/stitching.h"
 
@@ -127,6 +128,9 @@ class Coat {
   }
   /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
   [[nodiscard]] HeightRange range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// A plane that the face's own height keeps to over part of it: where the relief is smooth the error is of second
+  /// order in the part. [servo]
+  [[nodiscard]] HeightForm form(const CoatFrame& frame, const FacePart& part) const noexcept;
   /// Whether heights may differ between neighbours at some edge, so that they have to be stitched. [any]
   [[nodiscard]] bool has_seams() const noexcept { return has_seams_; }
   /// Whether some edge at `vertex` is one of them. [servo]
@@ -175,7 +179,9 @@ class Coat {
   [[nodiscard]] HeightJet layered_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightRange own_range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
-  /// Of a layer's map by itself: for own_jet and own_range, which look at no layers.
+  [[nodiscard]] HeightForm own_form(const CoatFrame& frame, const FacePart& part) const noexcept;
+  [[nodiscard]] HeightForm triplanar_form(const CoatFrame& frame, const FacePart& part) const noexcept;
+  /// Of a layer's map by itself: for own_jet, own_range and own_form, which see no layers.
   [[nodiscard]] CoatFrame layer_frame(const CoatFrame& frame, const CoatLayer& layer) const noexcept;
   Status take_layers(std::vector<CoatLayer> layers);
   void find_seams(const TriangleMesh& mesh);

@@ -260,6 +260,7 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
   }
   fill_texel_apron(values_.data(), width_, height_, wrap_, stored().apron());
   ranges_ = RangePyramid(stored());
+  planes_ = PlanePyramid(stored());
   const HeightRange bounds = ranges_.whole();
   // A weighted mean in floating point may leave the interval of its terms by rounding.
   const double size = std::abs(base_) + std::abs(bounds.lowest) + std::abs(bounds.highest);
@@ -272,7 +273,7 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
 }
 
 std::size_t HeightMap::memory_bytes() const noexcept {
-  return sizeof(*this) + values_.capacity() * sizeof(float) + ranges_.memory_bytes();
+  return sizeof(*this) + values_.capacity() * sizeof(float) + ranges_.memory_bytes() + planes_.memory_bytes();
 }
 
 HeightSample HeightMap::sample(const Vec2& st) const noexcept {
@@ -361,6 +362,38 @@ HeightRange HeightMap::range_over(const Vec2& lower, const Vec2& upper) const no
   const TexelSpan t = texels_under(std::min(lower.y(), upper.y()), std::max(lower.y(), upper.y()), height_, wrap_);
   const HeightRange range = ranges_.over(stored(), s, t);
   return {std::max(base_ + range.lowest - rounding_, lowest_), std::min(base_ + range.highest + rounding_, highest_)};
+}
+
+HeightPlane HeightMap::plane_over(const Vec2& lower, const Vec2& upper) const noexcept {
+  const Vec2 low = lower.cwiseMin(upper);
+  const Vec2 high = lower.cwiseMax(upper);
+  if (!low.allFinite() || !high.allFinite()) [[unlikely]]
+    return {0.5 * (low + high), 0.5 * (lowest_ + highest_), Vec2::Zero(), 0.5 * (highest_ - lowest_)};
+  const TexelSpan s = texels_under(low.x(), high.x(), width_, wrap_);
+  const TexelSpan t = texels_under(low.y(), high.y(), height_, wrap_);
+  // By how much the texels spanned are not those between the corners: no more than rounding, or one coordinate in the
+  // map stands for several of the rectangle.
+  constexpr double rounding = 1e-6;
+  const auto missing = [](const TexelSpan& span, double length) {
+    return std::abs(length - (span.count - 1 + span.to - span.from));
+  };
+  const Vec2 texels(width_, height_);
+  const Vec2 length = (high - low).cwiseProduct(texels);
+  const Vec2 off(missing(s, length.x()), missing(t, length.y()));
+  TexelPlane plane = planes_.over(stored(), s, t, off.x() > rounding, off.y() > rounding);
+  // Of noise the blocks' planes say less than their ranges.
+  constexpr double much = 0.25;
+  if (plane.error > much * (highest_ - lowest_)) {
+    const HeightRange range = ranges_.over(stored(), s, t);
+    if (range.highest - range.lowest < 2.0 * plane.error)
+      plane = {0.5 * (range.lowest + range.highest), Vec2::Zero(), 0.5 * (range.highest - range.lowest)};
+  }
+  HeightPlane answer{0.5 * (low + high), base_ + plane.height, plane.slope.cwiseProduct(texels), 0.0};
+  // Coordinates far from 0 are themselves rounded.
+  const Vec2 unsure = off.cwiseMin(rounding) + 4e-16 * (low.cwiseAbs() + high.cwiseAbs()).cwiseProduct(texels);
+  answer.error = plane.error + plane.slope.cwiseAbs().dot(unsure) + rounding_ +
+                 4e-16 * (std::abs(plane.height) + plane.slope.cwiseAbs().dot(length));
+  return answer;
 }
 
 }  // namespace asperity

@@ -6,6 +6,7 @@
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
 #include "asperity/field/height/image.h"
+#include "asperity/field/height/plane.h"
 #include "asperity/field/height/range.h"
 
 namespace asperity {
@@ -124,6 +125,12 @@ class HeightMap {
   /// [servo]
   [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper) const noexcept;
 
+  /// A plane that the height keeps to over the same rectangle, by rounding too. Where the relief is smooth its error is
+  /// of second order in the rectangle; at worst it is what range_over answers, nearly. Along an axis on which the
+  /// rectangle leaves a clamped map or spans all of a repeated one it is level. The time does not depend on the size.
+  /// With a coordinate that is not finite: level, as far off as the whole map. [servo]
+  [[nodiscard]] HeightPlane plane_over(const Vec2& lower, const Vec2& upper) const noexcept;
+
   /// No sample is below this (m): the least texel, or the least coefficient of the B-spline on a grid twice as fine,
   /// which holds its overshoot (amendment 11): 4 % wide at a step, up to 40 % of the range for noise between texels.
   /// [any]
@@ -165,6 +172,7 @@ class HeightMap {
   std::vector<float> values_;  // texel heights or B-spline coefficients, m, relative to base_
   double base_ = 0.0;          // m
   RangePyramid ranges_;        // relative to base_
+  PlanePyramid planes_;        // likewise
   double rounding_ = 0.0;      // m: a sample may differ from the exact reconstruction by so much
   double lowest_ = 0.0;
   double highest_ = 0.0;

@@ -189,6 +189,17 @@ HeightRange Mesostructure::range_over(const Vec2& lower, const Vec2& upper, doub
           mixed.highest + part * (above.highest - mixed.highest) + room};
 }
 
+HeightPlane Mesostructure::plane_over(const Vec2& lower, const Vec2& upper, double level) const noexcept {
+  const auto [finer, coarser, part] = maps_at(level);
+  HeightPlane mixed = finer->plane_over(lower, upper);
+  if (part <= 0.0) return mixed;
+  const HeightPlane above = coarser->plane_over(lower, upper);
+  mixed.height += part * (above.height - mixed.height);
+  mixed.slope += part * (above.slope - mixed.slope);
+  mixed.error += part * (above.error - mixed.error) + 1e-15 * (std::abs(mixed.height) + std::abs(above.height));
+  return mixed;
+}
+
 Mesostructure Mesostructure::with_detail(std::shared_ptr<const DetailPyramid> detail) const {
   Mesostructure copy = *this;
   copy.detail_ = std::move(detail);

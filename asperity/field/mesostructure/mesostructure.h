@@ -44,6 +44,8 @@ class Mesostructure {
   }
   /// Bounds of that height over a rectangle, as HeightMap::range_over. [servo]
   [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
+  /// A plane that it keeps to, as HeightMap::plane_over. [servo]
+  [[nodiscard]] HeightPlane plane_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
   /// The same mesostructure with levels of detail. [build]
   [[nodiscard]] Mesostructure with_detail(std::shared_ptr<const DetailPyramid> detail) const;
   /// Its levels of detail, or nullptr. [any]

@@ -390,6 +390,56 @@ HeightRange SolidMesostructure::range(const Vec3& centre, const Vec3& half_exten
   return {-most, most};
 }
 
+SolidPlane SolidMesostructure::noise_plane(const Vec3& centre, const Vec3& half_extent, double time) const noexcept {
+  const Vec3 carried = centre - time * spec_.drift;
+  SolidPlane plane;
+  for (const Octave& octave : octaves()) {
+    const double radius = octave.frequency * half_extent.norm();
+    const double reach = 0.5 * most_noise_bend * radius * radius + 1e-12;
+    if (reach >= most_noise) {
+      plane.error += octave.amplitude * most_noise;
+      continue;
+    }
+    const CellJet cell = noise_at(octave.frequency * carried + octave.shift, octave.key);
+    plane.height += octave.amplitude * cell.f;
+    plane.gradient += octave.amplitude * octave.frequency * Vec3(cell.x, cell.y, cell.z);
+    plane.error += octave.amplitude * reach;
+  }
+  return plane;
+}
+
+double SolidMesostructure::most_bend() const noexcept {
+  const double number = two_pi / spec_.wavelength;
+  switch (spec_.kind) {
+    case SolidKind::waves: return spec_.amplitude * number * number;
+    // A third each along three axes at right angles.
+    case SolidKind::lattice: return spec_.amplitude * number * number / 3.0;
+    // The rounded distance bends by at most one over its rounding, a quarter wavelength.
+    case SolidKind::rings: return spec_.amplitude * (number * number + number * 4.0 / spec_.wavelength);
+    // (1 - q^2)^3 by q: 6 (1 - q^2) (5 q^2 - 1) along the radius, -6 (1 - q^2)^2 across.
+    case SolidKind::pulse: return 6.0 * spec_.amplitude / (spec_.wavelength * spec_.wavelength);
+    case SolidKind::noise: break;
+  }
+  return infinity;
+}
+
+SolidPlane SolidMesostructure::plane(const Vec3& centre, const Vec3& half_extent, double time) const noexcept {
+  const HeightRange all = range(centre, half_extent, time);
+  const SolidPlane level{0.5 * (all.lowest + all.highest), Vec3::Zero(), 0.5 * (all.highest - all.lowest)};
+  const Vec3 half = half_extent.cwiseAbs();
+  const bool far = !((centre.cwiseAbs() + half).maxCoeff() < farthest && std::abs(time) < farthest);
+  if (far) [[unlikely]]
+    return level;
+  SolidPlane sloped;
+  if (spec_.kind == SolidKind::noise) {
+    sloped = noise_plane(centre, half, time);
+  } else {
+    const SolidJet here = jet(centre, time);
+    sloped = {here.height, here.gradient, 0.5 * most_bend() * half.squaredNorm() + 1e-15 * spec_.amplitude};
+  }
+  return sloped.error < level.error ? sloped : level;
+}
+
 bool SolidMesostructure::moves() const noexcept {
   return spec_.kind == SolidKind::noise ? !spec_.drift.isZero(0.0) : spec_.frequency != 0.0;
 }

@@ -18,6 +18,13 @@ struct SolidJet {
   Mat3 second = Mat3::Zero();    ///< 1/m
 };
 
+/// A plane that it keeps to over a box: |H(p) - height - gradient . (p - centre)| <= error.
+struct SolidPlane {
+  double height = 0.0;           ///< m, at the centre
+  Vec3 gradient = Vec3::Zero();  ///< m/m
+  double error = 0.0;            ///< m
+};
+
 /// What a solid mesostructure is.
 enum class SolidKind : std::uint8_t {
   /// amplitude * cos(2 pi (direction . p / wavelength - frequency t) + phase): layers, travelling waves
@@ -75,6 +82,8 @@ class SolidMesostructure {
   /// Bounds of the height over a box of this centre and half extent (m) at a moment: never too narrow. Exact for waves
   /// in boxes along them; for noise, of second order in the box while that is small against the finest octave. [servo]
   [[nodiscard]] HeightRange range(const Vec3& centre, const Vec3& half_extent, double time) const noexcept;
+  /// A plane that the height keeps to over the same box; of second order in the box while that is small. [servo]
+  [[nodiscard]] SolidPlane plane(const Vec3& centre, const Vec3& half_extent, double time) const noexcept;
   /// Whether it changes with time. [any]
   [[nodiscard]] bool moves() const noexcept;
   /// Smallest length over which it changes (m): its shortest wavelength. [any]
@@ -95,6 +104,9 @@ class SolidMesostructure {
   [[nodiscard]] HeightRange wave_range(const Vec3& axis, double amplitude, const Vec3& centre, const Vec3& half_extent,
                                        double time) const noexcept;
   [[nodiscard]] HeightRange noise_range(const Vec3& centre, const Vec3& half_extent, double time) const noexcept;
+  [[nodiscard]] SolidPlane noise_plane(const Vec3& centre, const Vec3& half_extent, double time) const noexcept;
+  /// Bound of the second derivatives of all kinds but noise (1/m).
+  [[nodiscard]] double most_bend() const noexcept;
 
   /// One octave of noise: its lattice and how high it stands.
   struct Octave {

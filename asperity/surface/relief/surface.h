@@ -46,6 +46,12 @@ struct ReliefReport {
   [[nodiscard]] std::string advice() const;
 };
 
+/// Where a relief is over part of a face: no point of it is farther than `error` from a triangle.
+struct ReliefBound {
+  Vec3 corner[3];      ///< m
+  double error = 0.0;  ///< m
+};
+
 /// A base mesh that wears a coat of relief: the displaced surface x = V + H N itself (formulation D2, D3).
 ///
 /// Over each triangle x is a smooth function of the barycentric coordinates; neighbours share directions and, through
@@ -105,6 +111,11 @@ class ReliefSurface {
   }
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
+  /// A plane that the height as rendered keeps to over part of the frame's triangle. Where the relief is smooth the
+  /// error is of second order in the part; in folds that are rounded it is a range. [servo]
+  [[nodiscard]] HeightForm form(const ReliefFrame& frame, const FacePart& part) const noexcept;
+  /// The same in space, over a triangle. [servo]
+  [[nodiscard]] ReliefBound bound(const ReliefFrame& frame, const FacePart& part) const noexcept;
   /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. Its triangle,
   /// which stays in `cache` until another one is asked for; null where no prism holds p. [servo]
   [[nodiscard]] const ReliefFrame* locate(const Vec3& p, SurfaceCache& cache, const CoatMoment& moment,
@@ -155,6 +166,9 @@ class ReliefSurface {
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
+  [[nodiscard]] HeightForm stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept;
+  [[nodiscard]] HeightRange range_around(const ReliefFrame& frame, const FacePart& part) const noexcept;
   template <class Visit>
   void for_each_partner(const ReliefFrame& frame, double u, double v, Visit&& visit) const noexcept;
 

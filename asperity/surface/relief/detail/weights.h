@@ -39,9 +39,11 @@ struct Projection {
   Vec2 by_v = Vec2::Zero();
 };
 
+// Faces that are seen more aslant than this have no say.
+inline constexpr double least_cosine = 0.02;
+
 /// [servo]
 inline Projection project(const ShellPrism& from, double u, double v, const ShellPrism& onto) noexcept {
-  constexpr double least_cosine = 0.02;
   const Vec3 direction = from.direction_at(u, v);
   const Vec3 cross = onto.edge_u.cross(onto.edge_v);
   const double facing = cross.dot(direction);
