@@ -11,7 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "bench/real_rows.h"
 #include "bench/report.h"
+#ifdef ASPERITY_HAS_OPENVDB
+#include "asperity/io/vdb/vdb.h"
+#endif
+#ifdef ASPERITY_HAS_VTK
+#include "asperity/io/vtk/vtk_volume.h"
+#endif
 
 namespace {
 
@@ -26,6 +33,7 @@ struct Options {
   std::size_t updates = 100000;
   std::size_t cold_updates = 200;
   std::size_t counted = 0;  ///< ticks a row for a tool that counts; 0: timed
+  RealEffort real{"../shared/data", 20000, {}, false};
 };
 
 void say(const std::string& what) {
@@ -126,6 +134,28 @@ int say_counted(const std::vector<Group>& groups, std::size_t ticks) {
   return code;
 }
 
+int run_real(const Options& options) {
+  if (!std::filesystem::is_directory(options.real.data)) {
+    fmt::print(stderr, "latency: {} is no folder; accepted: --data with meshes, textures and volumes in it\n",
+               options.real.data.string());
+    return 2;
+  }
+#ifdef ASPERITY_HAS_VTK
+  register_vtk_volumes();
+#endif
+#ifdef ASPERITY_HAS_OPENVDB
+  register_vdb();
+#endif
+  const Result<std::vector<RealRow>> rows =
+      measure_real(options.real, clock_cost_ns(), [](std::string_view what) { fmt::print(stderr, "{}\n", what); });
+  if (!rows) {
+    fmt::print(stderr, "latency: {}\n", rows.error().message());
+    return 2;
+  }
+  fmt::print("{}", real_text(*rows));
+  return 0;
+}
+
 int run(const Options& options, const std::string& command) {
   Report report;
   report.command = command;
@@ -156,8 +186,15 @@ int main(int argc, char** argv) {
     app.add_flag("--check", options.check,
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
-    app.add_option("--only", options.only, "One kind of rows: mesh, relief, volume, potential, fine, formula or refit")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit"}));
+    app.add_option("--only", options.only,
+                   "One kind of rows: mesh, relief, volume, potential, fine, formula, refit or real")
+        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "real"}));
+    app.add_option("--data", options.real.data, "real: folder of meshes, textures and volumes")->capture_default_str();
+    app.add_option("--ticks", options.real.ticks, "real: ticks a row")
+        ->check(CLI::Range(100, 100000000))
+        ->capture_default_str();
+    app.add_option("--rows", options.real.only, "real: rows whose \"body, stroke, law\" holds this text");
+    app.add_flag("--every", options.real.every, "real: every pair of strokes and laws");
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();
@@ -176,7 +213,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& problem) {
       return app.exit(problem) == 0 ? 0 : 2;
     }
-    return run(options, command);
+    return options.only == "real" ? run_real(options) : run(options, command);
   } catch (const std::exception& problem) {
     std::fprintf(stderr, "latency: %s\n", problem.what());
     return 2;

@@ -32,6 +32,17 @@ struct BvhFitting {
   std::vector<FloatBox> bounds;
 };
 
+/// Boxes around what stands over each triangle, in the order of a hierarchy over the triangles: what is searched for
+/// may be larger than they are. [build]
+struct FaceBoxes {
+  std::vector<BoxesOf8> leaves;
+  std::vector<BoxesOf8> nodes;
+  double farther = 0.0;  ///< how far they reach beyond the triangles' own boxes at most (m)
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return (leaves.capacity() + nodes.capacity()) * sizeof(BoxesOf8);
+  }
+};
+
 /// Bounding-volume hierarchy, eight wide, binned by surface area (Wald 2007); leaves hold up to eight triangles in
 /// single precision relative to the object's centre and size. Single precision only discards, with a bound on its
 /// rounding; every answer is decided in double precision on the mesh's own vertices, so it equals brute force. Queries
@@ -72,9 +83,11 @@ class Bvh {
     return static_cast<double>(rounding(local)) * scale_;
   }
 
-  /// Calls visit(one, other) once for every pair of triangles whose boxes, one for each triangle and around it, meet,
-  /// and perhaps for some that miss each other by a rounding. [build]
-  void for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const;
+  /// Boxes, one a triangle (m), ready to be searched; never too small. [build]
+  [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
+  /// Calls visit(one, other) once for every pair of triangles whose boxes meet, and perhaps for some that miss each
+  /// other by a rounding. [build]
+  void for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const;
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const;
@@ -82,6 +95,14 @@ class Bvh {
   /// first, until visit answers a t (0 … 1) below the entry of all that remain. [servo]
   template <class Visit>
   void for_each_along(const Segment& segment, double radius, Visit&& visit) const;
+
+  /// The same for the triangles whose own boxes the segment meets. [servo]
+  template <class Visit>
+  void for_each_along(const Segment& segment, const FaceBoxes& boxes, Visit&& visit) const;
+  /// Calls visit(face) for triangles whose boxes come within a bound (m) of `p`, the nearest first, roughly; visit
+  /// answers the bound from then on. [servo]
+  template <class Visit>
+  void for_each_near(const Vec3& p, double bound, const FaceBoxes& boxes, Visit&& visit) const;
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return sizeof(*this) + nodes_.capacity() * sizeof(Node) + leaves_.capacity() * sizeof(Leaf) +
@@ -111,6 +132,7 @@ class Bvh {
     float key;
     std::uint32_t child;
   };
+  struct LocalSegment;
   class Builder;
   class Fitter;
   class Join;
@@ -119,6 +141,11 @@ class Bvh {
   void frame(const TriangleMesh& mesh) noexcept;
   void fit_avx2(BvhFitting& fitting) noexcept;
   void to_local(const Vec3& p, float local[3]) const noexcept;
+  [[nodiscard]] LocalSegment local_segment(const Segment& segment) const noexcept;
+  template <class Boxes, class Meets, class TakeLeaf>
+  void descend(float& limit, const Boxes& boxes, const Meets& meets, const TakeLeaf& leaf) const;
+  /// The one of a mask with the least key.
+  static unsigned nearest_of(unsigned mask, const float (&keys)[8]) noexcept;
   [[nodiscard]] ClosestHit closest_from_afar(const Vec3& p, double bound) const noexcept;
   static bool reaches(const Cylinder& cylinder, const float local[3], float limit) noexcept;
   template <class Visit>
@@ -139,6 +166,15 @@ class Bvh {
 
 inline void Bvh::to_local(const Vec3& p, float local[3]) const noexcept {
   for (int axis = 0; axis < 3; ++axis) local[axis] = static_cast<float>((p[axis] - origin_[axis]) * per_scale_);
+}
+
+inline unsigned Bvh::nearest_of(unsigned mask, const float (&keys)[8]) noexcept {
+  auto nearest = static_cast<unsigned>(__builtin_ctz(mask));
+  for (mask &= mask - 1; mask != 0; mask &= mask - 1) {
+    const auto i = static_cast<unsigned>(__builtin_ctz(mask));
+    if (keys[i] < keys[nearest]) nearest = i;
+  }
+  return nearest;
 }
 
 inline float Bvh::rounding(const float local[3]) noexcept {
@@ -245,21 +281,33 @@ void Bvh::for_each_in_box(const Box& box, Visit&& visit) const {
   }
 }
 
-template <class Visit>
-void Bvh::for_each_along(const Segment& segment, double radius, Visit&& visit) const {
-  if (nodes_.empty()) return;
+/// A segment as the kernels take it.
+struct Bvh::LocalSegment {
   float origin[3];
-  float end[3];
-  to_local(segment.from, origin);
-  to_local(segment.to, end);
-  const float grow = static_cast<float>(radius * per_scale_) * 1.000001F + rounding(origin) + rounding(end);
   float inverse[3];
+  float grow;  ///< bound on the rounding of both ends
+};
+
+inline Bvh::LocalSegment Bvh::local_segment(const Segment& segment) const noexcept {
+  LocalSegment local;
+  float end[3];
+  to_local(segment.from, local.origin);
+  to_local(segment.to, end);
+  local.grow = rounding(local.origin) + rounding(end);
   for (int axis = 0; axis < 3; ++axis) {
-    const float direction = end[axis] - origin[axis];
+    const float direction = end[axis] - local.origin[axis];
     // A direction of zero would turn 0 * infinity into NaN on a box's face; a tiny one keeps every comparison defined.
-    inverse[axis] = 1.0F / (direction >= 0.0F ? direction + 1e-20F : direction - 1e-20F);
+    local.inverse[axis] = 1.0F / (direction >= 0.0F ? direction + 1e-20F : direction - 1e-20F);
   }
-  float limit = 1.00001F;
+  return local;
+}
+
+/// Visits leaves, the nearest first, roughly: boxes(node) are those of a node's children, meets(boxes, keys) tells
+/// which of the eight come into question, and their keys; what has a key above `limit`, which leaf(index) lowers, does
+/// not.
+template <class Boxes, class Meets, class TakeLeaf>
+void Bvh::descend(float& limit, const Boxes& boxes, const Meets& meets, const TakeLeaf& leaf) const {
+  if (nodes_.empty()) return;
   Entry stack[stack_capacity];
   int top = 0;
   stack[top++] = {0.0F, 0};
@@ -267,24 +315,86 @@ void Bvh::for_each_along(const Segment& segment, double radius, Visit&& visit) c
     const Entry entry = stack[--top];
     if (entry.key > limit) continue;
     if ((entry.child & leaf_bit) != 0) {
-      for (const std::uint32_t face : leaves_[entry.child & ~leaf_bit].face) {
-        if (face == no_index) continue;
-        limit = static_cast<float>(visit(face)) * 1.00001F + 1e-6F;
-      }
+      leaf(entry.child & ~leaf_bit);
       continue;
     }
-    const Node& node = nodes_[entry.child];
     float keys[8];
-    unsigned mask = kernels_->ray(node.boxes, origin, inverse, limit, grow, keys);
+    unsigned mask = meets(boxes(entry.child), keys);
     const int first = top;
     for (; mask != 0; mask &= mask - 1) {
       const auto i = static_cast<unsigned>(__builtin_ctz(mask));
-      if (node.child[i] == empty_child) continue;
+      const std::uint32_t child = nodes_[entry.child].child[i];
+      if (child == empty_child) continue;
       int slot = top++;
       for (; slot > first && stack[slot - 1].key < keys[i]; --slot) stack[slot] = stack[slot - 1];
-      stack[slot] = {keys[i], node.child[i]};
+      stack[slot] = {keys[i], child};
     }
   }
+}
+
+template <class Visit>
+void Bvh::for_each_along(const Segment& segment, double radius, Visit&& visit) const {
+  const LocalSegment local = local_segment(segment);
+  const float grow = static_cast<float>(radius * per_scale_) * 1.000001F + local.grow;
+  float limit = 1.00001F;
+  descend(
+      limit, [&](std::uint32_t node) -> const BoxesOf8& { return nodes_[node].boxes; },
+      [&](const BoxesOf8& boxes, float(&keys)[8]) {
+        return kernels_->ray(boxes, local.origin, local.inverse, limit, grow, keys);
+      },
+      [&](std::uint32_t leaf) {
+        for (const std::uint32_t face : leaves_[leaf].face) {
+          if (face == no_index) continue;
+          limit = static_cast<float>(visit(face)) * 1.00001F + 1e-6F;
+        }
+      });
+}
+
+template <class Visit>
+void Bvh::for_each_along(const Segment& segment, const FaceBoxes& boxes, Visit&& visit) const {
+  const LocalSegment local = local_segment(segment);
+  float limit = 1.00001F;
+  const auto meets = [&](const BoxesOf8& eight, float(&keys)[8]) {
+    return kernels_->ray(eight, local.origin, local.inverse, limit, local.grow, keys);
+  };
+  descend(
+      limit, [&](std::uint32_t node) -> const BoxesOf8& { return boxes.nodes[node]; }, meets,
+      [&](std::uint32_t leaf) {
+        float keys[8];
+        unsigned mask = meets(boxes.leaves[leaf], keys);
+        while (mask != 0) {
+          const auto i = nearest_of(mask, keys);
+          mask &= ~(1U << i);
+          if (keys[i] > limit || leaves_[leaf].face[i] == no_index) continue;
+          limit = static_cast<float>(visit(leaves_[leaf].face[i])) * 1.00001F + 1e-6F;
+        }
+      });
+}
+
+template <class Visit>
+void Bvh::for_each_near(const Vec3& p, double bound, const FaceBoxes& boxes, Visit&& visit) const {
+  float local[3];
+  to_local(p, local);
+  const float error = rounding(local);
+  // Squares of distances that any box may have from here.
+  const auto square = [&](double distance) {
+    const float reach = std::min(static_cast<float>(std::min(distance * per_scale_, 1e15)) * 1.000001F + error, 1e15F);
+    return reach * reach;
+  };
+  float limit = square(bound);
+  const auto meets = [&](const BoxesOf8& eight, float(&keys)[8]) { return kernels_->boxes(eight, local, limit, keys); };
+  descend(
+      limit, [&](std::uint32_t node) -> const BoxesOf8& { return boxes.nodes[node]; }, meets,
+      [&](std::uint32_t leaf) {
+        float keys[8];
+        unsigned mask = meets(boxes.leaves[leaf], keys);
+        while (mask != 0) {
+          const auto i = nearest_of(mask, keys);
+          mask &= ~(1U << i);
+          if (keys[i] > limit || leaves_[leaf].face[i] == no_index) continue;
+          limit = square(visit(leaves_[leaf].face[i]));
+        }
+      });
 }
 
 }  // namespace asperity

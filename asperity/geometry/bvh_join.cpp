@@ -44,24 +44,7 @@ FloatBox around(const BoxesOf8& boxes) {
 
 class Bvh::Join {
  public:
-  Join(const Bvh& bvh, std::span<const Box> boxes) : bvh_(bvh), leaves_(bvh.leaves_.size()), nodes_(bvh.nodes_.size()) {
-    for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
-      for (std::size_t i = 0; i < 8; ++i) {
-        const std::uint32_t face = bvh.leaves_[leaf].face[i];
-        leaves_[leaf].set(i, face == no_index ? FloatBox{} : local(boxes[face]));
-      }
-    }
-    for (std::size_t node = nodes_.size(); node-- > 0;) {
-      for (std::size_t i = 0; i < 8; ++i) {
-        const std::uint32_t child = bvh.nodes_[node].child[i];
-        if (child == empty_child) {
-          nodes_[node].set(i, {});
-        } else {
-          nodes_[node].set(i, around((child & leaf_bit) != 0 ? leaves_[child & ~leaf_bit] : nodes_[child]));
-        }
-      }
-    }
-  }
+  Join(const Bvh& bvh, const FaceBoxes& boxes) : bvh_(bvh), leaves_(boxes.leaves), nodes_(boxes.nodes) {}
 
   ASPERITY_INLINE void run(const MeetingVisit& visit) const {
     for (std::uint32_t leaf = 0; leaf < leaves_.size(); ++leaf) {
@@ -92,18 +75,6 @@ class Bvh::Join {
 #endif
 
  private:
-  /// In the hierarchy's own units, grown by more than their rounding.
-  [[nodiscard]] FloatBox local(const Box& box) const {
-    FloatBox grown;
-    bvh_.to_local(box.lower, grown.lower);
-    bvh_.to_local(box.upper, grown.upper);
-    for (int axis = 0; axis < 3; ++axis) {
-      grown.lower[axis] -= 1e-6F * (1.0F + std::abs(grown.lower[axis]));
-      grown.upper[axis] += 1e-6F * (1.0F + std::abs(grown.upper[axis]));
-    }
-    return grown;
-  }
-
   ASPERITY_INLINE void join(std::uint32_t one, std::uint32_t other, const MeetingVisit& visit) const {
     const BoxesOf8& boxes = leaves_[one];
     for (std::size_t i = 0; i < 8; ++i) {
@@ -120,11 +91,41 @@ class Bvh::Join {
   }
 
   const Bvh& bvh_;
-  std::vector<BoxesOf8> leaves_;
-  std::vector<BoxesOf8> nodes_;
+  const std::vector<BoxesOf8>& leaves_;
+  const std::vector<BoxesOf8>& nodes_;
 };
 
-void Bvh::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const {
+FaceBoxes Bvh::enclosed(std::span<const Box> boxes) const {
+  // In the hierarchy's own units, grown by more than their rounding.
+  const auto local = [&](const Box& box) {
+    FloatBox grown;
+    to_local(box.lower, grown.lower);
+    to_local(box.upper, grown.upper);
+    for (int axis = 0; axis < 3; ++axis) {
+      grown.lower[axis] -= 1e-6F * (1.0F + std::abs(grown.lower[axis]));
+      grown.upper[axis] += 1e-6F * (1.0F + std::abs(grown.upper[axis]));
+    }
+    return grown;
+  };
+  FaceBoxes all{std::vector<BoxesOf8>(leaves_.size()), std::vector<BoxesOf8>(nodes_.size())};
+  for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::uint32_t face = leaves_[leaf].face[i];
+      all.leaves[leaf].set(i, face == no_index ? FloatBox{} : local(boxes[face]));
+    }
+  }
+  for (std::size_t node = nodes_.size(); node-- > 0;) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::uint32_t child = nodes_[node].child[i];
+      const bool empty = child == empty_child;
+      all.nodes[node].set(
+          i, empty ? FloatBox{} : around((child & leaf_bit) != 0 ? all.leaves[child & ~leaf_bit] : all.nodes[child]));
+    }
+  }
+  return all;
+}
+
+void Bvh::for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const {
   const Join join(*this, boxes);
 #if defined(__x86_64__)
   static const bool wide = __builtin_cpu_supports("avx2");
@@ -133,19 +134,25 @@ void Bvh::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit
   join.run(visit);
 }
 
-void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const {
-  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(boxes, visit);
-  // The octree knows where the triangles are: boxes reach farther by no more than this.
-  double farther = 0.0;
+FaceBoxes TriangleIndex::enclosed(std::span<const Box> boxes) const {
+  FaceBoxes all;
+  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) all = bvh->enclosed(boxes);
   for (std::uint32_t face = 0; face < boxes.size(); ++face) {
     Box own;
     for (const Vec3& corner : mesh().corners(face)) own.include(corner);
-    farther =
-        std::max({farther, (own.lower - boxes[face].lower).maxCoeff(), (boxes[face].upper - own.upper).maxCoeff()});
+    all.farther =
+        std::max({all.farther, (own.lower - boxes[face].lower).maxCoeff(), (boxes[face].upper - own.upper).maxCoeff()});
   }
+  return all;
+}
+
+void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const {
+  const FaceBoxes all = enclosed(boxes);
+  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(all, visit);
+  // The octree knows where the triangles are.
   std::vector<std::uint32_t> last_met(boxes.size(), no_index);
   for (std::uint32_t face = 0; face < boxes.size(); ++face) {
-    for_each_in_box(boxes[face].grown(farther), [&](std::uint32_t other) {
+    for_each_in_box(boxes[face].grown(all.farther), [&](std::uint32_t other) {
       // A face that stands in several cells counts once.
       if (other <= face || last_met[other] == face) return;
       last_met[other] = face;

@@ -80,6 +80,30 @@ class TriangleIndex {
     });
   }
 
+  /// Boxes, one a triangle and around it (m), to be searched instead of the triangles. [build]
+  [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
+  /// for_each_along for the triangles whose boxes the segment meets, and perhaps some more. [servo]
+  template <class Visit>
+  void for_each_along(const Segment& segment, const FaceBoxes& boxes, Visit&& visit) const {
+    if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) {
+      bvh->for_each_along(segment, boxes, visit);
+    } else {
+      for_each_along(segment, boxes.farther, visit);
+    }
+  }
+  /// Calls visit(face), roughly from near to far, for every triangle whose box comes within a bound (m) of `p`, and
+  /// perhaps some more; visit answers the bound from then on. [servo]
+  template <class Visit>
+  void for_each_near(const Vec3& p, double bound, const FaceBoxes& boxes, Visit&& visit) const {
+    if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) {
+      bvh->for_each_near(p, bound, boxes, visit);
+      return;
+    }
+    Box around;
+    around.include(p);
+    for_each_in_box(around.grown(bound + boxes.farther), [&](std::uint32_t face) { visit(face); });
+  }
+
   /// First touch of a ball of `radius` (m, plus skin) moving along `motion`. Triangles seen from behind at the start
   /// are passed through when `sides` is front. A ball's motion
   /// shorter than a quarter of its radius is judged at its end: on the way a triangle may come nearer than at both ends

@@ -63,6 +63,7 @@ struct Goal {
   double friction = 0.0;      ///< Coulomb's coefficient: the point comes to rest where its pull lies on that cone
   bool may_leave = true;      ///< false: stays on the surface whatever the goal (closest points)
   Sides sides = Sides::both;  ///< that can be in the way
+  bool exactly = false;       ///< goes on until rounding alone is left, of reliefs
 };
 
 /// What one surface is during one tick, in its own object frame: a few pointers and what is felt of it now (a level, a

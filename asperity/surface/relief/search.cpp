@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/geometry/closest_point.h"
 #include "asperity/surface/relief/view.h"
 
 namespace asperity {
@@ -102,72 +103,73 @@ struct PatchHit {
   double v = 0.0;
 };
 
-/// Searches one triangle for the first place where a segment meets its relief.
+/// Searches one triangle for the first place where a segment meets its relief. A crossing lies on the curve that the
+/// segment is in the shell's coordinates, so that the search is along that curve alone: pieces of it over which the
+/// relief is bounded away from it are passed over, others halved.
 class PatchRay {
  public:
   PatchRay(const ReliefSurface& surface, const ReliefFrame& frame, const Segment& segment, Sides sides) noexcept
       : surface_(surface),
         frame_(frame),
-        plane_(frame.prism),
-        start_(plane_.turned(segment.from - frame.prism.corner)),
-        rate_(plane_.turned(segment.to - segment.from)),
         segment_(segment),
         way_(segment.to - segment.from),
         sides_(sides),
-        leaf_(leaf_level(frame)) {
-    corner_[0] = plane_.turned(frame.prism.direction);
-    turn_u_ = plane_.turned(frame.prism.turn_u);
-    turn_v_ = plane_.turned(frame.prism.turn_v);
-  }
+        leaf_(leaf_level(frame)) {}
 
   PatchHit first(double limit) noexcept {
-    PatchHit best;
-    best.t = limit;
-    Part stack[stack_capacity];
-    int top = 0;
-    stack[top] = whole();
     double from = 0.0;
-    double to = limit;
-    if (!meets(stack[top], from, to)) return {};
-    stack[top++].key = from;
-    bool found = false;
+    double to = std::min(1.0, limit);
+    PatchHit best;
+    if (!clip(from, to)) return {};
+    Piece stack[deepest + 2];
+    int top = 0;
+    stack[top++] = {at(from, guess(from)), at(to, guess(to)), 0};
     while (top > 0) {
-      const Part part = stack[--top];
-      if (part.key > best.t) continue;
-      if (part.level >= leaf_) {
-        found = solve(part, best) || found;
+      const Piece piece = stack[--top];
+      if (passed_over(piece)) continue;
+      if (is_leaf(piece)) {
+        if (solve(piece, best)) return best;
         continue;
       }
-      Part parts[4];
-      split(part, parts);
-      const int below = top;
-      for (Part& child : parts) {
-        from = 0.0;
-        to = best.t;
-        if (!meets(child, from, to)) continue;
-        child.key = from;
-        int slot = top++;
-        for (; slot > below && stack[slot - 1].key < child.key; --slot) stack[slot] = stack[slot - 1];
-        stack[slot] = child;
-      }
+      const Moment middle = halfway(piece);
+      // The earlier half first.
+      stack[top++] = {middle, piece.to, piece.level + 1};
+      stack[top++] = {piece.from, middle, piece.level + 1};
     }
-    if (!found) best = {};
-    return best;
+    return {};
   }
 
  private:
-  /// Whether the segment meets the hull of the relief over a part; cuts [from, to] down to where.
-  bool meets(const Part& part, double& from, double& to) const noexcept {
-    const HeightRange range = surface_.range(frame_, part.corner);
+  /// The motion at a time, in the shell's coordinates.
+  struct Moment {
+    double t = 0.0;
+    ShellPlace place;
+    double value = infinity;  ///< height over the relief (m), once it is asked for
+    bool reached = false;     ///< by the shell
+  };
+  struct Piece {
+    Moment from;
+    Moment to;
+    int level = 0;
+  };
+
+  /// To where the segment is within the hull of all of the face's relief.
+  bool clip(double& from, double& to) noexcept {
+    const ShellPrism& prism = frame_.prism;
+    const PlaneFrame plane(prism);
+    start_ = plane.turned(segment_.from - prism.corner);
+    rate_ = plane.turned(way_);
+    const Vec3 turned[3] = {plane.turned(prism.direction), plane.turned(prism.direction + prism.turn_u),
+                            plane.turned(prism.direction + prism.turn_v)};
+    const HeightRange range = surface_.range(frame_.face);
     // u, v, 1 - u - v and the height over the plane, at six points: exact bounds of their hull.
     double low[4] = {infinity, infinity, infinity, infinity};
     double high[4] = {-infinity, -infinity, -infinity, -infinity};
-    for (const Vec2& corner : part.corner) {
-      const Vec3 direction = corner_[0] + corner.x() * turn_u_ + corner.y() * turn_v_;
+    for (int corner = 0; corner < 3; ++corner) {
       for (const double height : {range.lowest, range.highest}) {
-        const double u = corner.x() + height * direction.x();
-        const double v = corner.y() + height * direction.y();
-        const double values[4] = {u, v, 1.0 - u - v, height * direction.z()};
+        const double u = (corner == 1 ? 1.0 : 0.0) + height * turned[corner].x();
+        const double v = (corner == 2 ? 1.0 : 0.0) + height * turned[corner].y();
+        const double values[4] = {u, v, 1.0 - u - v, height * turned[corner].z()};
         for (int k = 0; k < 4; ++k) {
           low[k] = std::min(low[k], values[k]);
           high[k] = std::max(high[k], values[k]);
@@ -175,7 +177,7 @@ class PatchRay {
       }
     }
     // Room for the rounding of all this: far below a skin.
-    const double room_plane = 1e-12 * (1.0 + std::abs(start_.x()) + std::abs(start_.y()));
+    const double room_plane = 1e-9 + 1e-12 * (std::abs(start_.x()) + std::abs(start_.y()));
     const double room_height = 1e-3 * surface_.skin() + 1e-14 * std::abs(start_.z());
     return cut(start_.x(), rate_.x(), low[0] - room_plane, high[0] + room_plane, from, to) &&
            cut(start_.y(), rate_.y(), low[1] - room_plane, high[1] + room_plane, from, to) &&
@@ -184,41 +186,114 @@ class PatchRay {
            cut(start_.z(), rate_.z(), low[3] - room_height, high[3] + room_height, from, to);
   }
 
-  /// Height of the segment over the relief, in the shell's coordinates (m). False where the shell does not reach.
-  bool over(double t, ShellPlace& place, double& value) const noexcept {
-    if (!frame_.prism.invert(segment_.from + t * way_, place)) return false;
-    value = place.height - surface_.height(frame_, place.u, place.v).height;
-    return true;
+  /// As if directions were the plane's normal.
+  [[nodiscard]] ShellPlace guess(double t) const noexcept {
+    return {start_.x() + t * rate_.x(), start_.y() + t * rate_.y(), start_.z() + t * rate_.z()};
   }
 
-  /// The motion at a time, in the shell's coordinates.
-  struct Moment {
-    double t = 0.0;
-    ShellPlace place;
-    double value = 0.0;    ///< height over the relief (m)
-    bool reached = false;  ///< by the shell
-  };
-
   Moment at(double t, const ShellPlace& near) const noexcept {
-    Moment moment{t, near, 0.0, false};
-    moment.reached = over(t, moment.place, moment.value);
+    Moment moment{t, near, infinity, false};
+    moment.reached = frame_.prism.invert(segment_.from + t * way_, moment.place);
     return moment;
   }
 
-  /// Looks for a change of sign of the height over the relief between samples within a leaf, and closes in on it.
-  bool solve(const Part& part, PatchHit& best) const noexcept {
-    constexpr int samples = 3;
-    double from = 0.0;
-    double to = std::min(1.0, best.t);
-    if (!meets(part, from, to)) return false;
-    const Vec2 middle = (part.corner[0] + part.corner[1] + part.corner[2]) / 3.0;
-    const ShellPlace guess{middle.x(), middle.y(), 0.0};
-    Moment before = at(from, guess);
+  [[nodiscard]] Moment halfway(const Piece& piece) const noexcept {
+    const double t = 0.5 * (piece.from.t + piece.to.t);
+    if (!piece.from.reached || !piece.to.reached) {
+      const Moment middle = at(t, guess(t));
+      if (middle.reached || (!piece.from.reached && !piece.to.reached)) return middle;
+      return at(t, piece.from.reached ? piece.from.place : piece.to.place);
+    }
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
+    const Moment middle = at(t, {0.5 * (a.u + b.u), 0.5 * (a.v + b.v), 0.5 * (a.height + b.height)});
+    return middle.reached ? middle : at(t, a);
+  }
+
+  void evaluate(Moment& moment) const noexcept {
+    if (moment.value < infinity || !moment.reached) return;
+    moment.value = moment.place.height - surface_.height(frame_, moment.place.u, moment.place.v).height;
     // A motion that starts on the surface starts outside it, whatever rounding says.
-    if (from == 0.0 && before.value < 0.0 && before.value >= -surface_.skin()) before.value = 0.0;
+    if (moment.t == 0.0 && moment.value < 0.0 && moment.value >= -surface_.skin()) moment.value = 0.0;
+  }
+
+  /// Whether a piece of the curve is over the face nowhere, or on one side of the relief throughout.
+  [[nodiscard]] bool passed_over(const Piece& piece) const noexcept {
+    if (!piece.from.reached || !piece.to.reached) {
+      // Where the shell does not reach at either end of ever shorter pieces there is no relief.
+      constexpr int patience = 4;
+      return !piece.from.reached && !piece.to.reached && piece.level >= patience;
+    }
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
+    ShellPlace bend;
+    if (!bends_by(piece, bend)) return false;
+    const double beside = overlap + std::max(bend.u, bend.v);
+    if (std::max(a.u, b.u) < -beside || std::max(a.v, b.v) < -beside ||
+        std::min(a.u + a.v, b.u + b.v) > 1.0 + 2.0 * beside)
+      return true;
+    const HeightForm form = surface_.form(frame_, FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v}));
+    // Height over the plane that the relief keeps to, at both ends.
+    const double half = 0.5 * (form.u * (b.u - a.u) + form.v * (b.v - a.v));
+    const double over_from = a.height - form.height + half;
+    const double over_to = b.height - form.height - half;
+    const double off = form.error + bend.height + std::abs(form.u) * bend.u + std::abs(form.v) * bend.v +
+                       1e-12 * (std::abs(a.height) + std::abs(b.height) + std::abs(form.height));
+    if (std::min(over_from, over_to) > off) return true;
+    return std::max(over_from, over_to) < -off - (piece.from.t == 0.0 ? surface_.skin() : 0.0);
+  }
+
+  /// By how much the curve over a piece is off the straight line between its ends, and what it is bent by is known
+  /// well enough. From S(c(t)) = p(t): c'' = -2 h' J^-1 (N' (u', v')).
+  [[nodiscard]] bool bends_by(const Piece& piece, ShellPlace& bend) const noexcept {
+    const ShellPrism& prism = frame_.prism;
+    const double du = piece.to.place.u - piece.from.place.u;
+    const double dv = piece.to.place.v - piece.from.place.v;
+    const double dh = piece.to.place.height - piece.from.place.height;
+    const Vec3 turn = (2.0 * dh) * (du * prism.turn_u + dv * prism.turn_v);
+    if (turn.isZero(0.0)) {
+      bend = {0.0, 0.0, 0.0};
+      return true;
+    }
+    const ShellGradients gradients = shell_gradients(prism, piece.from.place);
+    const double second[3] = {std::abs(gradients.u.dot(turn)), std::abs(gradients.v.dot(turn)),
+                              std::abs(gradients.height.dot(turn))};
+    // An eighth of the second derivative, twice over for what it changes by; each by all three, as they turn into one
+    // another.
+    const double size = std::abs(du) + std::abs(dv);
+    const double along = second[0] + second[1];
+    const double per_height = frame_height();
+    const double all = along + second[2] / per_height;
+    if (!(all <= 0.25 * (size + std::abs(dh) / per_height))) return false;
+    bend = {0.25 * (second[0] + 0.25 * all), 0.25 * (second[1] + 0.25 * all),
+            0.25 * (second[2] + 0.25 * all * per_height)};
+    return true;
+  }
+  /// What a height is measured by, as an edge measures a coordinate (m).
+  [[nodiscard]] double frame_height() const noexcept {
+    return std::sqrt(frame_.prism.edge_u.cross(frame_.prism.edge_v).norm());
+  }
+
+  [[nodiscard]] bool is_leaf(const Piece& piece) const noexcept {
+    if (piece.level >= deepest) return true;
+    if (!piece.from.reached || !piece.to.reached) return piece.level >= leaf_;
+    const double size =
+        std::max(std::abs(piece.to.place.u - piece.from.place.u), std::abs(piece.to.place.v - piece.from.place.v));
+    return size <= std::ldexp(1.0, -leaf_) &&
+           std::abs(piece.to.place.height - piece.from.place.height) <= std::ldexp(frame_height(), -leaf_);
+  }
+
+  /// Looks for a change of sign of the height over the relief between samples within a leaf, and closes in on it.
+  bool solve(const Piece& piece, PatchHit& best) const noexcept {
+    constexpr int samples = 3;
+    const double from = piece.from.t;
+    const double to = piece.to.t;
+    Moment before = piece.from;
+    evaluate(before);
     for (int i = 1; i <= samples; ++i) {
       const double t = i == samples ? to : from + (to - from) * i / samples;
-      const Moment after = at(t, before.reached ? before.place : guess);
+      Moment after = i == samples ? piece.to : at(t, before.reached ? before.place : guess(t));
+      evaluate(after);
       Moment first = before;
       Moment last = after;
       if (keep_over_face(first, last)) {
@@ -240,7 +315,6 @@ class PatchRay {
   /// formula goes on to beyond an edge may rise over the motion once more. Faces overlap by a hair, so that nothing
   /// slips in between. False when it is nowhere over the face between them.
   bool keep_over_face(Moment& first, Moment& last) const noexcept {
-    constexpr double overlap = 1e-9;
     if (!first.reached && !last.reached) return false;
     if (!last.reached && !retreat(first, last)) return false;
     if (!first.reached && !retreat(last, first)) return false;
@@ -249,9 +323,9 @@ class PatchRay {
       const double at_last = inside(last.place, side) + overlap;
       if (at_first < 0.0 && at_last < 0.0) return false;
       if (at_last < 0.0) {
-        last = at_side(first, last, side, overlap);
+        last = at_side(first, last, side);
       } else if (at_first < 0.0) {
-        first = at_side(last, first, side, overlap);
+        first = at_side(last, first, side);
         // Beside this face it came in over the neighbour if at all, where the same height had the same sign but for
         // rounding.
         if (first.value < 0.0 && first.value >= -1e-4 * surface_.skin()) first.value = 0.0;
@@ -271,12 +345,13 @@ class PatchRay {
       else
         beyond = middle.t;
     }
+    evaluate(far);
     return far.t != near.t;
   }
 
   /// The moment between one over the face and one beyond a side of it in which the motion is on that side: by false
   /// position, in the half of the overlap that is next to the face.
-  Moment at_side(Moment within, Moment beyond, int side, double overlap) const noexcept {
+  Moment at_side(Moment within, Moment beyond, int side) const noexcept {
     double weight_within = inside(within.place, side) + 0.5 * overlap;
     double weight_beyond = inside(beyond.place, side) + 0.5 * overlap;
     if (weight_within <= 0.0) return within;
@@ -284,8 +359,9 @@ class PatchRay {
       double t = within.t + (beyond.t - within.t) * weight_within / (weight_within - weight_beyond);
       if (i % 4 == 3) t = 0.5 * (within.t + beyond.t);
       if (t == within.t || t == beyond.t) break;
-      const Moment there = at(t, within.place);
+      Moment there = at(t, within.place);
       if (!there.reached) break;
+      evaluate(there);
       const double weight = inside(there.place, side) + 0.5 * overlap;
       if (std::abs(weight) <= 0.5 * overlap) return there;
       if (weight > 0.0) {
@@ -314,8 +390,9 @@ class PatchRay {
       double t = from + (to - from) * weight_from / (weight_from - weight_to);
       if (i % 3 == 2 || !(t > from && t < to)) t = 0.5 * (from + to);
       if (t <= from || t >= to) break;
-      const Moment there = at(t, answer);
+      Moment there = at(t, answer);
       if (!there.reached) return false;
+      evaluate(there);
       if ((there.value >= 0.0) == (first.value >= 0.0)) {
         from = t;
         weight_from = there.value;
@@ -327,23 +404,21 @@ class PatchRay {
         weight_from *= 0.5;
       }
     }
-    if (from > best.t) return false;
     best = {from, answer.u, answer.v};
     return true;
   }
 
+  /// Faces overlap by a hair, so that nothing slips in between (barycentric).
+  static constexpr double overlap = 1e-9;
+
   const ReliefSurface& surface_;
   const ReliefFrame& frame_;
-  PlaneFrame plane_;
-  Vec3 start_;
-  Vec3 rate_;
-  Vec3 corner_[1];
-  Vec3 turn_u_;
-  Vec3 turn_v_;
   Segment segment_;
   Vec3 way_;
   Sides sides_;
   int leaf_;
+  Vec3 start_ = Vec3::Zero();  ///< of the motion in the plane's frame
+  Vec3 rate_ = Vec3::Zero();
 };
 
 /// Searches triangles for the point of their relief that is nearest to a point.
@@ -361,7 +436,7 @@ class ReliefNearestSearch {
   void descend_from(const ReliefPlace& place) noexcept {
     ReliefPlace at = place;
     ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
-    descend(surface_, at, spot, 1.0, {.point = p_, .may_leave = false});
+    descend(surface_, at, spot, 1.0, {.point = p_, .may_leave = false, .exactly = true});
     const double now = (spot.point - p_).norm();
     if (now > distance_ || (now == distance_ && found())) return;
     distance_ = now;
@@ -406,36 +481,16 @@ class ReliefNearestSearch {
   }
 
  private:
-  /// Sets the part's key, which no point of its relief is nearer than: by the ball around its hull and by its slab.
+  /// Sets the part's key, which no point of its relief is nearer than.
   void measure(const ReliefFrame& frame, Part& part) const noexcept {
-    const HeightRange range = surface_.range(frame, part.corner);
-    Vec3 points[6];
-    Vec3 centre = Vec3::Zero();
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 base = frame.prism.base_at(part.corner[k].x(), part.corner[k].y());
-      const Vec3 direction = frame.prism.direction_at(part.corner[k].x(), part.corner[k].y());
-      points[2 * k] = base + range.lowest * direction;
-      points[2 * k + 1] = base + range.highest * direction;
-      centre += points[2 * k] + points[2 * k + 1];
-    }
-    centre /= 6.0;
-    const Vec3 normal = frame.prism.edge_u.cross(frame.prism.edge_v).normalized();
-    double radius = 0.0;
-    double low = infinity;
-    double high = -infinity;
-    for (const Vec3& point : points) {
-      radius = std::max(radius, (point - centre).squaredNorm());
-      low = std::min(low, normal.dot(point));
-      high = std::max(high, normal.dot(point));
-    }
-    const double level = normal.dot(p_);
-    const double slab = std::max({0.0, low - level, level - high});
-    part.radius = std::sqrt(radius);
-    // Across the slab and along it are at right angles: far tighter than the ball alone where p is far.
-    const Vec3 offset = p_ - centre;
-    const double along = (offset - normal.dot(offset) * normal).norm() - part.radius;
-    part.key = along > 0.0 ? std::sqrt(slab * slab + along * along) : slab;
-    part.key = std::max(part.key, offset.norm() - part.radius);
+    const ReliefBound bound = surface_.bound(frame, FacePart::triangle(part.corner[0], part.corner[1], part.corner[2]));
+    const double square =
+        closest_point_on_triangle(p_, bound.corner[0], bound.corner[1], bound.corner[2]).squared_distance;
+    part.key = std::sqrt(std::max(0.0, square)) - bound.error;
+    const Vec3 middle = (bound.corner[0] + bound.corner[1] + bound.corner[2]) / 3.0;
+    part.radius = 0.0;
+    for (const Vec3& corner : bound.corner) part.radius = std::max(part.radius, (corner - middle).norm());
+    part.radius += bound.error;
   }
 
   const ReliefSurface& surface_;
@@ -466,7 +521,7 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
   if (!(way.squaredNorm() > 0.0)) return best;
   ReliefPlace place;
   // Nearly all motions are far shorter than a face: the neighbourhood decides.
-  surface_->base().index().for_each_along(motion, surface_->reach(), [&](std::uint32_t face) {
+  surface_->base().index().for_each_along(motion, surface_->boxes(), [&](std::uint32_t face) {
     if (skip(face)) return best.t;
     const ReliefFrame here = surface_->frame(face, moment_);
     const PatchHit hit = PatchRay(*surface_, here, motion, sides).first(best.t);
@@ -514,10 +569,10 @@ Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const 
     search.descend_from({surface_->frame(under.element, moment_), under.at[1], under.at[2]});
   }
   if (search.distance() == infinity) return {};
-  Box around;
-  around.include(p);
-  base.index().for_each_in_box(around.grown(search.distance() + surface_->reach()),
-                               [&](std::uint32_t face) { search.visit(face); });
+  base.index().for_each_near(p, search.distance(), surface_->boxes(), [&](std::uint32_t face) {
+    search.visit(face);
+    return search.distance();
+  });
   if (!search.found()) return {};
   cache_->relief = {search.place(), search.spot(), true};
   return foot_at(search.place(), search.spot(), p);

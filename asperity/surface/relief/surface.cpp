@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asperity/core/identity.h"
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 
@@ -201,7 +202,9 @@ void ReliefSurface::fit(ShellDirections directions) {
   reach_ = longest * (coat_.amplitude_bound() + fold_depth_);
   grain_ = std::min(coat_.texel_size(), mesh.mean_edge());
   skin_ = std::min(base_.skin(), 1e-3 * grain_);
-  find_overlaps();
+  const std::vector<Box> boxes = enclose();
+  boxes_ = base_.index().enclosed(boxes);
+  find_overlaps(boxes);
 }
 
 void ReliefSurface::lower(const std::vector<double>& share_of_face) {
@@ -218,16 +221,51 @@ void ReliefSurface::lower(const std::vector<double>& share_of_face) {
   shares_ = std::move(share);
 }
 
-void ReliefSurface::find_overlaps() {
+std::vector<Box> ReliefSurface::enclose() {
   const TriangleMesh& mesh = base_.mesh();
-  const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
-  // What the coat holds anywhere; the tight range of a face only where that does not settle it.
-  const HeightRange anywhere{std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_};
+  const std::size_t faces = mesh.triangles().size();
   std::vector<Box> boxes(faces);
-  for (std::uint32_t face = 0; face < faces; ++face) {
-    for (const Vec3& point : hull_points(shell_.prism(mesh, face), anywhere)) boxes[face].include(point);
-  }
-  const auto tight = [&](std::uint32_t face) { return range(frame(face), whole_triangle); };
+  ranges_.assign(faces, {});
+  const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
+  // Levels of layers go by those of the first map, and may pass one of their own between two of its.
+  const bool anything = coat_.moves() || (coat_.levels() > 0 && !coat_.layers().empty());
+  // Rounded outwards by more than a float rounds.
+  const auto rounded = [](double value, double sign) {
+    return static_cast<float>(value + sign * 1e-6 * std::abs(value) + sign * 1e-30);
+  };
+  parallel_for(faces, {.grain = 256}, [&](std::size_t i) {
+    const auto face = static_cast<std::uint32_t>(i);
+    HeightRange all{infinity, -infinity};
+    Box box;
+    if (anything) {
+      all = {std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_};
+      for (const Vec3& point : hull_points(shell_.prism(mesh, face), all)) box.include(point);
+    } else {
+      for (int level = 0; level <= coat_.levels(); ++level) {
+        const ReliefFrame frame = this->frame(face, {static_cast<double>(level), 0.0});
+        const HeightRange range = this->range(frame, whole_triangle);
+        all = {std::min(all.lowest, range.lowest), std::max(all.highest, range.highest)};
+        // Two ways to enclose it: what both hold.
+        Box slab;
+        for (const Vec3& point : hull_points(frame.prism, range)) slab.include(point);
+        const ReliefBound bound = this->bound(frame, whole);
+        Box around;
+        for (const Vec3& corner : bound.corner) around.include(corner);
+        around = around.grown(bound.error);
+        around.lower = around.lower.cwiseMax(slab.lower);
+        around.upper = around.upper.cwiseMin(slab.upper);
+        box.include(around.lower);
+        box.include(around.upper);
+      }
+    }
+    boxes[i] = box;
+    ranges_[i] = {rounded(all.lowest, -1.0), rounded(all.highest, 1.0)};
+  });
+  return boxes;
+}
+
+void ReliefSurface::find_overlaps(const std::vector<Box>& boxes) {
+  const TriangleMesh& mesh = base_.mesh();
   const auto apart = [](const Box& a, const Box& b) {
     return a.lower.x() > b.upper.x() || a.lower.y() > b.upper.y() || a.lower.z() > b.upper.z() ||
            b.lower.x() > a.upper.x() || b.lower.y() > a.upper.y() || b.lower.z() > a.upper.z();
@@ -236,17 +274,17 @@ void ReliefSurface::find_overlaps() {
     if (share_vertex(mesh.triangles()[face], mesh.triangles()[other]) || apart(boxes[face], boxes[other])) return;
     const ShellPrism here = shell_.prism(mesh, face);
     const ShellPrism there = shell_.prism(mesh, other);
-    if (hulls_apart(here, hull_points(here, anywhere), there, hull_points(there, anywhere))) return;
-    if (hulls_apart(here, hull_points(here, tight(face)), there, hull_points(there, tight(other)))) return;
+    if (hulls_apart(here, hull_points(here, range(face)), there, hull_points(there, range(other)))) return;
     ++report_.overlapping_pairs;
-    if (overlapped_.empty()) overlapped_.resize(faces, 0);
+    if (overlapped_.empty()) overlapped_.resize(mesh.triangles().size(), 0);
     overlapped_[face] = overlapped_[other] = 1;
   });
 }
 
 std::size_t ReliefSurface::memory_bytes() const noexcept {
   return base_.index().memory_bytes() + coat_.memory_bytes() + shell_.directions.capacity() * sizeof(Vec3f) +
-         bands_.capacity() * sizeof(StitchBand) + shares_.capacity() * sizeof(float) + overlapped_.capacity();
+         bands_.capacity() * sizeof(StitchBand) + shares_.capacity() * sizeof(float) + overlapped_.capacity() +
+         ranges_.capacity() * sizeof(FaceRange) + boxes_.memory_bytes();
 }
 
 ReliefFrame ReliefSurface::frame(std::uint32_t face, const CoatMoment& moment) const noexcept {

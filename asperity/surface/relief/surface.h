@@ -145,6 +145,12 @@ class ReliefSurface {
   [[nodiscard]] double least_fillet() const noexcept;
   /// How far the displaced surface is from its base at most (m). [any]
   [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// Boxes around the relief over each face, at every level and moment of its coat, for the base's index. [servo]
+  [[nodiscard]] const FaceBoxes& boxes() const noexcept { return boxes_; }
+  /// Bounds of the height as rendered over all of a face, at every level and moment (m). [servo]
+  [[nodiscard]] HeightRange range(std::uint32_t face) const noexcept {
+    return {static_cast<double>(ranges_[face].lowest), static_cast<double>(ranges_[face].highest)};
+  }
   /// Bytes of coat, base, search structure and shell. [any]
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
@@ -160,7 +166,8 @@ class ReliefSurface {
   void lay_fillets();
   [[nodiscard]] float band_to(std::uint32_t face, int edge) const noexcept;
   void lower(const std::vector<double>& share_of_face);
-  void find_overlaps();
+  [[nodiscard]] std::vector<Box> enclose();
+  void find_overlaps(const std::vector<Box>& boxes);
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
@@ -183,6 +190,12 @@ class ReliefSurface {
   std::vector<float> fillet_reach_;       ///< one a vertex: 1 - its coordinate, up to which all faces around have a say
   std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
   std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
+  struct FaceRange {
+    float lowest = 0.0F;
+    float highest = 0.0F;
+  };
+  std::vector<FaceRange> ranges_;  ///< one a face, rounded outwards
+  FaceBoxes boxes_;
   ReliefReport report_;
   double reach_ = 0.0;
   double skin_ = 0.0;

@@ -14,6 +14,8 @@ namespace {
 // A step below these shares of the relief's grain and of the mean edge is not worth making, once one has been made.
 constexpr double relief_rest_of_grain = 5e-4;
 constexpr double rest_of_edge = 5e-6;
+// Where the nearest point itself is asked for: Newton's next step would be as small against this one as this one is.
+constexpr double exact_rest = 1e-3;
 // The first one always is, unless the probe has not moved at all.
 constexpr double first_rest_of_grain = 1e-10;
 // Distance (in grains) between places where the way is checked.
@@ -26,7 +28,9 @@ struct ReliefFaces {
 
   const ReliefSurface& surface;
   CoatMoment moment;
-  double rest = std::min(relief_rest_of_grain * surface.grain(), rest_of_edge* mesh().mean_edge());
+  bool exactly = false;
+  double rest =
+      (exactly ? exact_rest : 1.0) * std::min(relief_rest_of_grain * surface.grain(), rest_of_edge* mesh().mean_edge());
   double first_rest = std::min(first_rest_of_grain * surface.grain(), rest);
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface.base().mesh(); }
@@ -107,7 +111,7 @@ Vec3 shared_place(const TriangleMesh& mesh, const Place& place, const Border& bo
 
 DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
                    const Goal& goal) noexcept {
-  const ReliefFaces faces{surface, place.frame.coat.moment};
+  const ReliefFaces faces{surface, place.frame.coat.moment, goal.exactly};
   FaceChart<ReliefFaces> chart(faces, place, spot);
   return Walk<FaceChart<ReliefFaces>>(chart, goal, side).run();
 }

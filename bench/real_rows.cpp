@@ -1,0 +1,334 @@
+#include "bench/real_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "asperity/core/rng.h"
+#include "asperity/io/experiment.h"
+#include "asperity/render/step.h"
+
+namespace asperity::bench {
+
+namespace {
+
+constexpr double dt = 1e-3;  // s
+
+// ---- bodies
+
+struct Body {
+  std::string name;
+  std::string surface;  ///< of a scene, as JSON
+  std::string file;     ///< that has to be there, under the data's folder; empty: none
+  bool volume = false;
+  double highest = 0.0;  ///< m, of its relief
+};
+
+std::vector<Body> bodies() {
+  struct Mesh {
+    const char* name;
+    const char* file;
+  };
+  struct Map {
+    const char* name;
+    const char* file;
+  };
+  const Mesh meshes[] = {{"bunny-28k", "meshes/bunny-28k.obj"},
+                         {"spot", "meshes/spot.obj"},
+                         {"FlightHelmet", "meshes/FlightHelmet/FlightHelmet.gltf"}};
+  const Map maps[] = {{"rock023", "textures/ambientcg/rock023_alb_ht.png"},
+                      {"wool", "textures/godot/wool_depth.png"},
+                      {"texture_rock", "textures/godot/texture_rock_depth.png"},
+                      {"stones", "textures/exr-height/stones.exr"}};
+  std::vector<Body> all;
+  for (const Mesh& mesh : meshes) {
+    for (const Map& map : maps) {
+      for (const double height : {0.3, 1.0, 2.0}) {
+        all.push_back({fmt::format("{}, {}, {:g} mm", mesh.name, map.name, height),
+                       fmt::format(R"({{"mesh":"{}","coat":{{"height_map":"{}","height":"{:g} mm"}}}})", mesh.file,
+                                   map.file, height),
+                       mesh.file, false, 1e-3 * height});
+      }
+    }
+  }
+  all.push_back({"vase", R"({"volume":"volumes/vase.vti"})", "volumes/vase.vti", true, 0.0});
+  all.push_back({"carotid", R"({"volume":"volumes/carotid.vtk"})", "volumes/carotid.vtk", true, 0.0});
+  all.push_back({"cavity", R"({"volume":{"generator":"cavity"}})", "", true, 0.0});
+  all.push_back({"bunny, potential", R"({"mesh":"meshes/bunny-28k.obj","implicit":{"resolution":128}})",
+                 "meshes/bunny-28k.obj", true, 0.0});
+  return all;
+}
+
+// ---- strokes
+
+/// Led over what carries a surface: places on it, with its outward normal there.
+class Carrier {
+ public:
+  explicit Carrier(const Instance& instance) : surface_(instance.surface) {
+    if (const MeshSurface* base = base_of(surface_); base != nullptr && iso_of(surface_) == nullptr) {
+      bounds_ = base->bounds();
+      grain_ = base->mesh().mean_edge();
+    } else {
+      bounds_ = iso_of(surface_)->surface_bounds();
+      grain_ = 0.01 * bounds_.diagonal();
+    }
+  }
+  [[nodiscard]] const Box& bounds() const { return bounds_; }
+  [[nodiscard]] double grain() const { return grain_; }
+
+  struct Spot {
+    Vec3 point;
+    Vec3 normal;
+  };
+  Spot nearest(const Vec3& p) {
+    const auto ask = [&](const auto& view) {
+      const Foot foot = view.nearest(p, infinity);
+      return foot.found() ? Spot{foot.point, view.front(foot)} : Spot{p, Vec3::UnitZ()};
+    };
+    if (const MeshSurface* base = base_of(surface_); base != nullptr && iso_of(surface_) == nullptr)
+      return ask(base->view(cache_));
+    const IsoSurface& iso = *iso_of(surface_);
+    iso.field().enter();
+    const Spot spot = ask(iso.view(cache_.cells, iso.field().levels() - 1, iso.threshold()));
+    iso.field().leave();
+    return spot;
+  }
+
+ private:
+  Surface surface_;
+  SurfaceCache cache_;
+  Box bounds_;
+  double grain_ = 0.0;
+};
+
+const char* const real_strokes[] = {"line",        "raster",    "spiral",      "walk with slips",
+                                    "pokes 2 m/s", "sweep 0.5", "sweep 5 m/s", "free flight"};
+
+/// Where the probe is at each tick. Places move along the carrier; the normal that depths are measured by follows
+/// slowly, so that facets are not felt in the probe's own path.
+std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highest, std::size_t ticks,
+                      std::uint64_t seed) {
+  Rng rng(seed);
+  std::vector<Vec3> path;
+  path.reserve(ticks);
+  const Box& bounds = carrier.bounds();
+  const auto random_spot = [&] {
+    Vec3 p = bounds.centre();
+    for (int axis = 0; axis < 3; ++axis) p[axis] += rng.uniform(-0.5, 0.5) * bounds.extent()[axis];
+    return carrier.nearest(p);
+  };
+  Carrier::Spot spot = random_spot();
+  Vec3 normal = spot.normal;
+  Vec3 heading = normal.unitOrthogonal();
+  double phase = 0.0;
+  for (std::size_t tick = 0; tick < ticks; ++tick) {
+    const double time = dt * static_cast<double>(tick);
+    double speed = 0.01;
+    double depth = 1e-3;
+    double turn = 0.3 * std::sin(0.7 * time);  // rad/s
+    if (stroke == "raster") {
+      speed = 0.05;
+      depth = 0.5e-3;
+      // To and fro over 10 mm, with a turn of half a circle in 20 ticks.
+      if (tick % 200 < 20) turn = std::numbers::pi / (20.0 * dt) * (tick / 200 % 2 == 0 ? 1.0 : -1.0);
+    } else if (stroke == "spiral") {
+      speed = 0.1;
+      depth = 0.7e-3;
+      turn = speed / (1e-3 + 2e-3 * std::fmod(time, 5.0));
+    } else if (stroke == "walk with slips") {
+      speed = 0.1 * (1.0 + std::sin(3.1 * time));
+      depth = 0.5e-3 + 1e-3 * std::sin(11.0 * time);
+      turn = 40.0 * rng.uniform(-1.0, 1.0);
+    } else if (stroke == "pokes 2 m/s") {
+      speed = 0.02;
+      // Down from 4 mm above by 2 mm a tick to 4 mm below, held for a while, and up again.
+      const std::size_t step = tick % 40;
+      const auto in = static_cast<double>(step);
+      const double down = step < 5 ? 2e-3 * in : (step < 35 ? 8e-3 : 2e-3 * (39.0 - in));
+      depth = down - 4e-3;
+    } else if (stroke == "sweep 0.5") {
+      speed = 0.5;
+      depth = 0.7e-3;
+    } else if (stroke == "sweep 5 m/s") {
+      speed = 5.0;
+      depth = 1e-3;
+    } else if (stroke == "free flight") {
+      speed = 0.05;
+      depth = -highest - 1e-3;
+    }
+    phase += dt;
+    heading = std::cos(turn * dt) * heading + std::sin(turn * dt) * normal.cross(heading);
+    const Carrier::Spot next = carrier.nearest(spot.point + speed * dt * heading);
+    // At a rim, or in a fold that it does not leave: somewhere else, as a hand that is lifted.
+    const bool stuck = (next.point - spot.point).norm() < 0.2 * speed * dt;
+    spot = stuck ? random_spot() : next;
+    if (stuck) normal = spot.normal;
+    const double share = std::min(1.0, speed * dt / (2.0 * carrier.grain()));
+    normal = (normal + share * (spot.normal - normal)).normalized();
+    heading = (heading - heading.dot(normal) * normal).normalized();
+    if (!heading.allFinite()) heading = normal.unitOrthogonal();
+    path.push_back(spot.point - depth * normal);
+  }
+  return path;
+}
+
+/// A plane across the middle of the bounds, as a wall.
+Result<Instance> wall_through(const Box& bounds) {
+  const double size = 2.0 * bounds.diagonal();
+  MeshSource source;
+  const Vec3 middle = bounds.centre() + Vec3(0.05 * bounds.extent().x(), 0.0, 0.0);
+  for (const double y : {-0.5, 0.5}) {
+    for (const double z : {-0.5, 0.5}) source.positions.push_back(middle + size * Vec3(0.0, y, z));
+  }
+  source.triangles = {{0, 2, 1}, {1, 2, 3}};
+  ASPERITY_TRY(TriangleMesh mesh, TriangleMesh::build(std::move(source)));
+  Instance wall;
+  wall.name = "wall";
+  wall.surface = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
+  wall.sides = Sides::both;
+  return wall;
+}
+
+// ---- rows
+
+void run(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, RealRow& row) {
+  ProxyState state;
+  ProxyCache cache;
+  ProxyState before;
+  ProxyState worst_state;
+  ProbeSample worst_probe;
+  double worst = -1.0;
+  Samples samples;
+  samples.reserve(path.size());
+  Vec3 last_force = Vec3::Zero();
+  std::size_t touched = 0;
+  ProbeSample probe;
+  for (std::size_t tick = 0; tick < path.size(); ++tick) {
+    probe.twist.linear = tick > 0 ? Vec3((path[tick] - path[tick - 1]) / dt) : Vec3(Vec3::Zero());
+    probe.pose.position = path[tick];
+    probe.time = Seconds(dt * static_cast<double>(tick));
+    before = state;
+    const Clock::time_point start = Clock::now();
+    const ForceSample felt = step(scene, state, cache, probe, Seconds(dt));
+    const Clock::duration time = Clock::now() - start;
+    const bool contact = felt.flags.has(TickFlag::contact);
+    samples.add(time, contact);
+    touched += contact ? 1U : 0U;
+    row.not_converged += felt.flags.has(TickFlag::not_converged) ? 1U : 0U;
+    row.limited += felt.flags.has(TickFlag::energy_limited) ? 1U : 0U;
+    if (tick > 0) row.largest_jump = std::max(row.largest_jump, (felt.wrench.force - last_force).norm());
+    last_force = felt.wrench.force;
+    const double nanoseconds = std::chrono::duration<double, std::nano>(time).count();
+    if (nanoseconds <= worst) continue;
+    worst = nanoseconds;
+    worst_state = before;
+    worst_probe = probe;
+  }
+  row.times = samples.summary(clock_cost);
+  row.contact_share = static_cast<double>(touched) / static_cast<double>(path.size());
+  // What the machine did meanwhile meets each of these alike, and the least of them hardly at all.
+  row.worst_again = infinity;
+  CacheSweep sweep;
+  for (int i = 0; i < 20; ++i) {
+    ProxyState from = worst_state;
+    ProxyCache empty;
+    sweep.run();
+    const Clock::time_point start = Clock::now();
+    step(scene, from, empty, worst_probe, Seconds(dt));
+    const double took = std::chrono::duration<double, std::nano>(Clock::now() - start).count();
+    row.worst_again = std::min(row.worst_again, took - clock_cost);
+  }
+}
+
+/// What goes with a body.
+std::vector<std::string> laws_for(const Body& body) {
+  if (body.name == "bunny, potential") return {"proxy", "virtual-contact-point", "magnetic"};
+  if (body.volume) return {"proxy", "cross-uncross", "avila"};
+  return {"proxy",         "proxy, friction",       "god-object", "force-shading", "height-field",
+          "mesostructure", "mesostructure-intended"};
+}
+
+Result<Experiment> read(const Body& body, const std::string& law, const std::filesystem::path& data) {
+  std::string surface = body.surface;
+  surface.pop_back();
+  const bool friction = law == "proxy, friction";
+  surface += fmt::format(R"(,"law":"{}")", friction ? "proxy" : law);
+  if (friction) surface += R"(,"material":{"static_friction":0.4,"dynamic_friction":0.3})";
+  const std::string scene = fmt::format(R"({{"surfaces":[{}}}]}})", surface);
+  return parse_experiment(scene, data, body.name);
+}
+
+}  // namespace
+
+Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock_cost,
+                                          const std::function<void(std::string_view)>& told) {
+  std::vector<RealRow> rows;
+  std::size_t number = 0;
+  for (const Body& body : bodies()) {
+    if (!body.file.empty() && !std::filesystem::exists(effort.data / body.file)) {
+      told(fmt::format("{}: skipped, {} is not there", body.name, (effort.data / body.file).string()));
+      continue;
+    }
+    const std::vector<std::string> laws = laws_for(body);
+    // Every stroke by one law at least, the proxy by every second; so that all pairs of strokes and laws come up.
+    std::vector<std::pair<std::string, std::string>> pairs;
+    for (std::size_t s = 0; s < std::size(real_strokes); ++s) {
+      if (effort.every) {
+        for (const std::string& law : laws) pairs.emplace_back(real_strokes[s], law);
+      } else {
+        if ((number + s) % 2 == 0) pairs.emplace_back(real_strokes[s], "proxy");
+        if ((number + s) % 3 == 0) pairs.emplace_back(real_strokes[s], laws[1 + (number + s / 3) % (laws.size() - 1)]);
+      }
+    }
+    pairs.emplace_back("beside a wall", "proxy");
+    ++number;
+    std::optional<Experiment> read_by;
+    std::string last_law;
+    std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    for (const auto& [stroke, law] : pairs) {
+      RealRow row{body.name, stroke, law, {}, 0.0, 0.0, 0, 0, 0.0};
+      if (!effort.only.empty() &&
+          fmt::format("{}, {}, {}", body.name, stroke, law).find(effort.only) == std::string::npos)
+        continue;
+      if (!read_by || last_law != law) {
+        ASPERITY_TRY(read_by, read(body, law, effort.data));
+        last_law = law;
+      }
+      const std::span<const Instance> read_instances = read_by->scene.instances();
+      std::vector<Instance> instances(read_instances.begin(), read_instances.end());
+      Carrier carrier(instances.front());
+      std::string led_as = stroke;
+      if (stroke == "beside a wall") {
+        ASPERITY_TRY(Instance wall, wall_through(carrier.bounds()));
+        instances.push_back(std::move(wall));
+        led_as = "raster";
+      }
+      ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), 0.0));
+      run(scene, led(led_as, carrier, body.highest, effort.ticks, 17), clock_cost, row);
+      told(fmt::format("{}, {}, {}: p99.9 {:.1f} us, worst {:.1f} us again {:.1f}", body.name, stroke, law,
+                       1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
+      rows.push_back(std::move(row));
+    }
+  }
+  return rows;
+}
+
+std::string real_text(const std::vector<RealRow>& rows) {
+  std::string text =
+      fmt::format("{:<32} {:<16} {:<24} {:>7} {:>8} {:>9} {:>9} {:>9} {:>5} {:>6} {:>6} {:>6}\n", "body", "stroke",
+                  "law", "p50 us", "p99", "p99.9", "max", "worst*", "in %", "not c.", "e.lim.", "jump N");
+  for (const RealRow& row : rows) {
+    text += fmt::format(
+        "{:<32} {:<16} {:<24} {:>7.2f} {:>8.2f} {:>9.2f} {:>9.1f} {:>9.1f} {:>5.0f} {:>6} {:>6} {:>6.2f}\n", row.body,
+        row.stroke, row.law, 1e-3 * row.times.p50, 1e-3 * row.times.p99, 1e-3 * row.times.p999, 1e-3 * row.times.max,
+        1e-3 * row.worst_again, 100.0 * row.contact_share, row.not_converged, row.limited, row.largest_jump);
+  }
+  return text +
+         "* the slowest tick again from its state, caches empty and 64 MB swept before: the least of 20 times.\n";
+}
+
+}  // namespace asperity::bench

@@ -1,0 +1,46 @@
+#pragma once
+// Rows on real meshes, maps and volumes: what a tick costs at its worst.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "asperity/core/result.h"
+#include "bench/measure.h"
+
+namespace asperity::bench {
+
+/// What one stroke over one surface by one law took.
+struct RealRow {
+  std::string body;
+  std::string stroke;
+  std::string law;
+  Latency times;                  ///< ns
+  double worst_again = 0.0;       ///< ns: the slowest tick from its state, caches empty and cold, the least of 20 times
+  double contact_share = 0.0;     ///< of the ticks
+  std::size_t not_converged = 0;  ///< ticks
+  std::size_t limited = 0;        ///< ticks whose energy was limited
+  double largest_jump = 0.0;      ///< N, between two ticks
+};
+
+/// How many ticks, and of what.
+struct RealEffort {
+  std::filesystem::path data;  ///< meshes/, textures/, volumes/
+  std::size_t ticks = 20000;   ///< a row
+  std::string only;            ///< rows whose "body, stroke, law" holds this text; empty: all
+  bool every = false;          ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them
+};
+
+/// Bodies of real data, each with strokes and laws that go together, in an order that is always the same; `told` hears
+/// of each row as it is done. Bodies whose files are missing are told as skipped. Errors: of scenes. [build]
+Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock_cost,
+                                          const std::function<void(std::string_view)>& told);
+
+/// As a table. [build]
+std::string real_text(const std::vector<RealRow>& rows);
+
+}  // namespace asperity::bench
