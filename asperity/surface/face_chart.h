@@ -190,7 +190,6 @@ class FaceChart {
     const double rest = rest_length(moves == 0);
     bool rim = false;
     for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
-      if (moves >= walk_budget) break;
       Place here;
       here.frame = face == place_.frame.face ? place_.frame : faces_.frame(face);
       const TriangleMesh::Triangle& t = mesh.triangles()[face];

@@ -64,6 +64,7 @@ struct Goal {
   bool may_leave = true;      ///< false: stays on the surface whatever the goal (closest points)
   Sides sides = Sides::both;  ///< that can be in the way
   bool exactly = false;       ///< goes on until rounding alone is left, of reliefs
+  int moves = 1024;           ///< evaluations that it may take
 };
 
 /// What one surface is during one tick, in its own object frame: a few pointers and what is felt of it now (a level, a

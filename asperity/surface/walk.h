@@ -44,6 +44,38 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
   return {};
 }
 
+/// Newton's step with each curvature of the squared distance counted as positive: along a ravine, where it is not
+/// convex, and not to and fro across. [servo]
+inline WalkStep ravine_step(const WalkForms& f) noexcept {
+  constexpr double least_curvature = 0.05;
+  if (!(f.uu > 0.0)) return {};
+  // In axes in which the metric is 1.
+  const double a = 1.0 / std::sqrt(f.uu);
+  const double det = f.vv - f.uv * f.uv / f.uu;
+  if (!(det > 0.0)) return {};
+  const double c = 1.0 / std::sqrt(det);
+  const double b = -f.uv / f.uu * c;
+  const double g0 = a * f.g_u;
+  const double g1 = b * f.g_u + c * f.g_v;
+  const double h00 = a * a * f.h_uu;
+  const double h01 = a * (b * f.h_uu + c * f.h_uv);
+  const double h11 = b * b * f.h_uu + 2.0 * b * c * f.h_uv + c * c * f.h_vv;
+  const double mean = 0.5 * (h00 + h11);
+  const double half = std::hypot(0.5 * (h00 - h11), h01);
+  double along0 = 1.0;
+  double along1 = 0.0;
+  if (half > 0.0) {
+    const double angle = 0.5 * std::atan2(2.0 * h01, h00 - h11);
+    along0 = std::cos(angle);
+    along1 = std::sin(angle);
+  }
+  const double first = (along0 * g0 + along1 * g1) / std::max(least_curvature, std::abs(mean + half));
+  const double second = (along0 * g1 - along1 * g0) / std::max(least_curvature, std::abs(mean - half));
+  const double y0 = -(along0 * first - along1 * second);
+  const double y1 = -(along1 * first + along0 * second);
+  return {a * y0 + b * y1, c * y1, std::hypot(y0, y1)};
+}
+
 /// The same in the tangent plane of a surface that a field gives: from a place where the goal lies `pull` (m) along it
 /// and `depth` (m) above it, `bend` the field's second derivatives over its slope. The pull itself where the distance
 /// is not convex. [servo]
@@ -58,9 +90,6 @@ inline Vec3 tangent_step(const Vec3& normal, const Vec3& pull, double depth, con
   if (a > 0.05 && determinant > 0.05 * c && c > 0.0) return (rate / determinant) * (c * along - b * across);
   return pull;
 }
-
-/// Evaluations that one walk may use.
-inline constexpr int walk_budget = 96;
 
 /// What a walk does at a border of its chart.
 enum class Turn { go, rest, rim };
@@ -83,13 +112,22 @@ class Walk {
   Walk(Chart& chart, const Goal& goal, double side) noexcept : chart_(chart), asked_(goal), side_(side) {}
 
   DescentEnd run() noexcept {
-    while (moves_ < walk_budget) {
+    int next_look = look_after;
+    double distance = infinity;
+    while (moves_ < asked_.moves) {
       if (asked_.may_leave && leaves()) return DescentEnd::left;
+      // Far behind a surface that is bent much there is no end to small moves that change no force.
+      if (!asked_.exactly && moves_ >= next_look) {
+        const double now = (chart_.spot().point - asked_.point).norm();
+        if (now >= distance * (1.0 - least_gain)) return DescentEnd::rest;
+        distance = now;
+        next_look = moves_ + look_after;
+      }
       aim();
       if (settled()) return DescentEnd::rest;
       forms_ = chart_.forms(goal_);
       formed_ = true;
-      WalkStep step = newton_step(forms_);
+      WalkStep step = shortened_ ? ravine_step(forms_) : newton_step(forms_);
       if (step.length <= chart_.rest_length(moves_ == 0)) return DescentEnd::rest;
       if (chart_.blocked(step)) {
         formed_ = false;
@@ -138,6 +176,7 @@ class Walk {
   bool advance(const WalkStep& step) noexcept {
     int border = -1;
     const double far = chart_.reach(step, border);
+    shortened_ = false;
     const auto start = chart_.start();
     double distance = (chart_.spot().point - goal_).squaredNorm();
     if (chart_.has_flanks()) rejected_ = own_ = chart_.spot().front;
@@ -157,14 +196,15 @@ class Walk {
     };
     const double strides = far * step.length / chart_.stride();
     // Mostly one; rounding up costs something.
-    const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * walk_budget)) : 1;
+    const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * asked_.moves)) : 1;
     bool any = false;
     for (int i = 1; i <= count; ++i) {
       if (!attempt(far * i / count, i == count ? border : -1)) break;
       any = true;
-      if (moves_ >= walk_budget) return true;
+      if (moves_ >= asked_.moves) return true;
     }
     if (any) return true;
+    shortened_ = true;
     double share = far / count;
     if (valley()) {
       // Across a valley the step ends where the flanks meet.
@@ -185,6 +225,9 @@ class Walk {
   }
 
   static constexpr int most_aims = 2;
+  // A walk is at rest where so many moves bring it nearer by less than this share of the distance.
+  static constexpr int look_after = 24;
+  static constexpr double least_gain = 1e-6;
   // Flanks that turn by less are one (rad).
   static constexpr double least_fold = 1e-3;
 
@@ -220,6 +263,7 @@ class Walk {
   Vec3 goal_ = Vec3::Zero();
   WalkForms forms_;               ///< of the last place
   bool formed_ = false;           ///< they are known, and of this chart
+  bool shortened_ = false;        ///< a step was no nearer as a whole
   Vec3 own_ = Vec3::Zero();       ///< front at the start of a step
   Vec3 rejected_ = Vec3::Zero();  ///< of a place that was no nearer
   Vec3 rejected_point_ = Vec3::Zero();

@@ -2,6 +2,7 @@
 // The proxy law where a point touches one surface: the servo loop's fast path, once for every kind of surface.
 
 #include "asperity/render/contact/coulomb.h"
+#include "asperity/render/contact/planes.h"
 #include "asperity/render/state.h"
 
 namespace asperity {
@@ -66,6 +67,8 @@ class PointProxy {
   [[nodiscard]] const Spot& spot() const noexcept { return spot_; }
 
  private:
+  /// Evaluations that one way along a surface may take.
+  static constexpr int most_walk = 1024;
   static constexpr bool on_triangles = requires(const View& v, const Place& p) { v.within_face(p); };
 
   [[nodiscard]] Vec3 normal() const noexcept { return place_.side() * spot_.front; }
@@ -73,6 +76,7 @@ class PointProxy {
   /// Straight to the probe through free space. False when nothing is in the way.
   bool fly(const Vec3& from) noexcept {
     state_.rests = state_.sliding = false;
+    flanks_.clear();
     const SweptHit hit = view_.first_touch({from, probe_}, sides_);
     if (!hit.hit || hit.contact.normal.isZero()) return false;
     take(hit);
@@ -102,6 +106,10 @@ class PointProxy {
     state_.places.clear();
     state_.places.push_back(place_);
     state_.normal = normal();
+    // In a crease it is pushed along what draws it.
+    const Vec3 spring = spot_.point - probe_;
+    if (!flanks_.empty() && !spring.isZero()) state_.normal = spring.normalized();
+    for (const Flank& flank : flanks_) state_.places.push_back(flank.place);
     return {true, true, converged, false, spot_.point, state_.normal};
   }
 
@@ -113,45 +121,146 @@ class PointProxy {
     return settle_on_fold();
   }
 
-  /// From one fold to another that overlaps it in space, and back: along the crease between them each change must come
-  /// nearer.
+  /// Another fold that the proxy touches beside the one that it is on: its place nearest to it.
+  struct Flank {
+    Place place;
+    Spot spot;
+    [[nodiscard]] Vec3 normal() const noexcept { return place.side() * spot.front; }
+  };
+
+  /// From one fold to another that overlaps it in space; where the probe draws it into both, along the crease between
+  /// them. Each move comes nearer.
   [[gnu::noinline]] DescentEnd settle_over_folds() noexcept {
-    constexpr int most_folds = 16;
-    constexpr double least_gain = 1e-9;
-    for (int fold = 0; fold < most_folds; ++fold) {
+    constexpr int most_moves = 24;
+    recall_flanks();
+    for (int move = 0; move < most_moves; ++move) {
+      PlaneSet planes;
+      planes.push_back(plane_of(spot_, normal()));
+      for (const Flank& flank : flanks_) planes.push_back(plane_of(flank.spot, flank.normal()));
+      const PlaneProjection held = project_onto_planes(probe_, planes, false);
+      if (held.active.size() < 2) {
+        if (!held.active.empty() && held.active[0].plane > 0 && !lead_with(held.active[0].plane - 1))
+          return DescentEnd::rest;
+        flanks_.clear();
+        DescentEnd end = DescentEnd::rest;
+        const Way way = go(end, [&](int moves) { return settle_on_fold(moves); });
+        if (way == Way::on) continue;
+        return way == Way::free ? end : DescentEnd::rest;
+      }
+      const Vec3 target = along_crease(held);
+      if ((target - spot_.point).norm() <= view_.skin()) return DescentEnd::rest;
       const Place place = place_;
       const Spot spot = spot_;
-      const DescentEnd end = settle_on_fold();
-      const SweptHit hit = view_.between(place, spot, place_, spot_, sides_);
-      if (!hit.hit) return end;
-      // Another fold was in the way: the proxy goes on from there, on that one, if it is nearer there.
-      take(hit);
-      const double distance = (spot.point - probe_).squaredNorm();
-      if (!((spot_.point - probe_).squaredNorm() < distance * (1.0 - least_gain))) {
+      DescentEnd end = DescentEnd::rest;
+      const Way way = go(end, [&](int moves) {
+        return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves});
+      });
+      if (way == Way::on) continue;
+      if (way == Way::stuck) return DescentEnd::rest;
+      if (!nearer(spot)) {
         place_ = place;
         spot_ = spot;
         return DescentEnd::rest;
       }
+      for (Flank& flank : flanks_) view_.descend(flank.place, flank.spot, {.point = spot_.point, .may_leave = false});
     }
     return DescentEnd::limited;
   }
 
-  DescentEnd settle_on_fold() noexcept {
-    if (friction_.still <= 0.0) return slide(0.0);
+  static ConstraintPlane plane_of(const Spot& spot, const Vec3& normal) noexcept {
+    return {normal, normal.dot(spot.point), 0.0, 0, {}};
+  }
+
+  /// What the last tick left it beside.
+  void recall_flanks() noexcept {
+    flanks_.clear();
+    if (!state_.rests) return;
+    for (std::size_t i = 1; i < state_.places.size(); ++i) {
+      Flank flank{state_.places[i], {}};
+      flank.spot = view_.at(flank.place, flank.place.side() * state_.normal);
+      if ((flank.spot.point - spot_.point).norm() <= view_.grain()) flanks_.push_back(flank);
+    }
+    state_.places.clear();
+  }
+
+  /// Takes a flank for the fold that it is on. False, and nothing done, where that is farther.
+  bool lead_with(std::size_t index) noexcept {
+    const Flank flank = flanks_[index];
+    if (!no_farther(flank.spot.point, spot_.point, probe_)) return false;
+    flanks_[index] = {place_, spot_};
+    place_ = flank.place;
+    spot_ = flank.spot;
+    return true;
+  }
+
+  /// Where the probe leads it along a crease: to the nearest point of the tangent planes, less what friction holds.
+  Vec3 along_crease(const PlaneProjection& held) noexcept {
+    const Vec3 way = held.point - spot_.point;
+    if (friction_.still <= 0.0) return held.point;
+    double push = 0.0;
+    for (const PlaneProjection::Active& one : held.active) push += one.multiplier;
+    const double length = way.norm();
+    state_.sliding = length > (state_.sliding ? friction_.sliding : friction_.still) * push;
+    if (!state_.sliding) return spot_.point;
+    return held.point - std::min(1.0, friction_.sliding * push / length) * way;
+  }
+
+  [[nodiscard]] bool nearer(const Spot& before) const noexcept {
+    constexpr double least_gain = 1e-9;
+    return (spot_.point - probe_).squaredNorm() < (before.point - probe_).squaredNorm() * (1.0 - least_gain);
+  }
+
+  /// What was on the way of a move along a fold.
+  enum class Way {
+    free,
+    on,     ///< another fold: it goes on from there, on that one and beside the one that it was on
+    stuck,  ///< another fold, no nearer: it is where it was
+  };
+  /// In legs, so that what is in the way is seen before much has been walked in vain.
+  template <class Lead>
+  Way go(DescentEnd& end, const Lead& lead) noexcept {
+    constexpr int first_leg = 24;
+    const Spot begin = spot_;
+    Place place;
+    Spot spot;
+    SweptHit hit;
+    for (int walked = 0, leg = first_leg; !hit.hit; walked += leg, leg *= 2) {
+      place = place_;
+      spot = spot_;
+      end = lead(leg);
+      hit = view_.between(place, spot, place_, spot_, sides_);
+      if (end != DescentEnd::limited || walked + leg >= most_walk) break;
+    }
+    if (!hit.hit) return Way::free;
+    Flank left{place, spot};
+    take(hit);
+    if (!nearer(spot)) {
+      place_ = place;
+      spot_ = spot;
+      return nearer(begin) ? Way::on : Way::stuck;
+    }
+    view_.descend(left.place, left.spot, {.point = spot_.point, .may_leave = false});
+    if (flanks_.size() == flanks_.capacity()) flanks_.swap_remove(0);
+    flanks_.push_back(left);
+    return Way::on;
+  }
+
+  DescentEnd settle_on_fold(int moves = most_walk) noexcept {
+    if (friction_.still <= 0.0) return slide(0.0, moves);
     const Vec3 normal_before = normal();
     if ((probe_ - spot_.point).dot(normal_before) > 0.0) return DescentEnd::left;
     if (holds(friction_, spot_.point, normal_before, probe_, state_.sliding)) return DescentEnd::rest;
     const Place place = place_;
     const Vec3 at = spot_.point;
-    const DescentEnd end = slide(friction_.sliding);
+    const DescentEnd end = slide(friction_.sliding, moves);
     if (no_farther(spot_.point, at, probe_)) return end;
     place_ = place;
     spot_ = view_.at(place_, normal_before);
     return DescentEnd::rest;
   }
 
-  DescentEnd slide(double friction) noexcept {
-    return view_.descend(place_, spot_, {.point = probe_, .friction = friction, .sides = sides_});
+  DescentEnd slide(double friction, int moves = most_walk) noexcept {
+    return view_.descend(place_, spot_, {.point = probe_, .friction = friction, .sides = sides_, .moves = moves});
   }
 
   const View& view_;
@@ -161,6 +270,7 @@ class PointProxy {
   OfSurface& state_;
   Place place_;
   Spot spot_;
+  FixedVector<Flank, 2> flanks_;
 };
 
 }  // namespace asperity

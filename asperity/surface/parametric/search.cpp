@@ -332,7 +332,7 @@ class Nearest {
   void take(const Vec2& from) noexcept {
     ParametricSpot at = surface_.view().spot(from);
     Place place{0, at.front.dot(p_ - at.point) < 0.0, {from.x(), from.y(), 0.0}};
-    surface_.view().descend(place, at, {.point = p_, .may_leave = false});
+    surface_.view().descend(place, at, {.point = p_, .may_leave = false, .exactly = true});
     const double distance = (at.point - p_).norm();
     if (!(distance <= best_)) return;
     found = true;
