@@ -26,6 +26,7 @@
 
 // geometry: triangle meshes and how they are searched
 #include "asperity/geometry/bvh.h"
+#include "asperity/geometry/bvh_search.h"
 #include "asperity/geometry/clip.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/contact.h"
@@ -48,6 +49,7 @@
 #include "asperity/field/height/image.h"
 #include "asperity/field/height/map.h"
 #include "asperity/field/height/normal_map.h"
+#include "asperity/field/height/plane.h"
 #include "asperity/field/height/range.h"
 #include "asperity/field/height/roughness.h"
 #include "asperity/field/height/surface_features.h"
@@ -78,6 +80,7 @@
 #include "asperity/surface/face_chart.h"
 #include "asperity/surface/face_place.h"
 #include "asperity/surface/feature_mapping.h"
+#include "asperity/surface/height_form.h"
 #include "asperity/surface/implicit/surface.h"
 #include "asperity/surface/implicit/texture.h"
 #include "asperity/surface/iso/surface.h"

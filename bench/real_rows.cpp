@@ -57,7 +57,7 @@ std::vector<Body> bodies() {
   }
   all.push_back({"vase", R"({"volume":"volumes/vase.vti"})", "volumes/vase.vti", true, 0.0});
   all.push_back({"carotid", R"({"volume":"volumes/carotid.vtk"})", "volumes/carotid.vtk", true, 0.0});
-  all.push_back({"cavity", R"({"volume":{"generator":"cavity"}})", "", true, 0.0});
+  all.push_back({"cavity", R"({"volume":{"generator":"cavity","derive":"vorticity_magnitude"}})", "", true, 0.0});
   all.push_back({"bunny, potential", R"({"mesh":"meshes/bunny-28k.obj","implicit":{"resolution":128}})",
                  "meshes/bunny-28k.obj", true, 0.0});
   return all;
@@ -108,10 +108,15 @@ class Carrier {
 const char* const real_strokes[] = {"line",        "raster",    "spiral",      "walk with slips",
                                     "pokes 2 m/s", "sweep 0.5", "sweep 5 m/s", "free flight"};
 
+/// Where the wall of the rows with one stands.
+double wall_at(const Box& bounds) {
+  return bounds.centre().x() + 0.05 * bounds.extent().x();
+}
+
 /// Where the probe is at each tick. Places move along the carrier; the normal that depths are measured by follows
 /// slowly, so that facets are not felt in the probe's own path.
 std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highest, std::size_t ticks,
-                      std::uint64_t seed) {
+                      std::uint64_t seed, bool across_wall) {
   Rng rng(seed);
   std::vector<Vec3> path;
   path.reserve(ticks);
@@ -121,10 +126,21 @@ std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highes
     for (int axis = 0; axis < 3; ++axis) p[axis] += rng.uniform(-0.5, 0.5) * bounds.extent()[axis];
     return carrier.nearest(p);
   };
-  Carrier::Spot spot = random_spot();
+  // Across a wall it goes to and fro through it.
+  const auto begin = [&] {
+    if (!across_wall) return random_spot();
+    Vec3 p = random_spot().point;
+    p.x() = wall_at(bounds);
+    return carrier.nearest(p);
+  };
+  Carrier::Spot spot = begin();
   Vec3 normal = spot.normal;
   Vec3 heading = normal.unitOrthogonal();
-  double phase = 0.0;
+  if (across_wall) heading = (Vec3::UnitX() - normal.x() * normal).normalized();
+  constexpr int most_stuck = 50;
+  constexpr double approach = 100.0;  // ticks
+  int stuck = 0;
+  std::size_t begun = 0;
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     const double time = dt * static_cast<double>(tick);
     double speed = 0.01;
@@ -160,18 +176,29 @@ std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highes
       speed = 0.05;
       depth = -highest - 1e-3;
     }
-    phase += dt;
     heading = std::cos(turn * dt) * heading + std::sin(turn * dt) * normal.cross(heading);
     const Carrier::Spot next = carrier.nearest(spot.point + speed * dt * heading);
-    // At a rim, or in a fold that it does not leave: somewhere else, as a hand that is lifted.
-    const bool stuck = (next.point - spot.point).norm() < 0.2 * speed * dt;
-    spot = stuck ? random_spot() : next;
-    if (stuck) normal = spot.normal;
+    // At a rim, or in a fold that it does not leave: another way; in the end somewhere else, from above.
+    if ((next.point - spot.point).norm() < 0.2 * speed * dt) {
+      const double angle = rng.uniform(0.5, 1.5) * std::numbers::pi;
+      heading = std::cos(angle) * heading + std::sin(angle) * normal.cross(heading);
+      if (++stuck > most_stuck) {
+        stuck = 0;
+        spot = begin();
+        normal = spot.normal;
+        begun = tick;
+      }
+    } else {
+      stuck = 0;
+      spot = next;
+    }
     const double share = std::min(1.0, speed * dt / (2.0 * carrier.grain()));
     normal = (normal + share * (spot.normal - normal)).normalized();
     heading = (heading - heading.dot(normal) * normal).normalized();
     if (!heading.allFinite()) heading = normal.unitOrthogonal();
-    path.push_back(spot.point - depth * normal);
+    // It comes down from above.
+    const double down = std::min(1.0, static_cast<double>(tick - begun) / approach);
+    path.push_back(spot.point - (down * depth - (1.0 - down) * (highest + 1e-3)) * normal);
   }
   return path;
 }
@@ -180,7 +207,8 @@ std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highes
 Result<Instance> wall_through(const Box& bounds) {
   const double size = 2.0 * bounds.diagonal();
   MeshSource source;
-  const Vec3 middle = bounds.centre() + Vec3(0.05 * bounds.extent().x(), 0.0, 0.0);
+  Vec3 middle = bounds.centre();
+  middle.x() = wall_at(bounds);
   for (const double y : {-0.5, 0.5}) {
     for (const double z : {-0.5, 0.5}) source.positions.push_back(middle + size * Vec3(0.0, y, z));
   }
@@ -308,7 +336,7 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
         led_as = "raster";
       }
       ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), 0.0));
-      run(scene, led(led_as, carrier, body.highest, effort.ticks, 17), clock_cost, row);
+      run(scene, led(led_as, carrier, body.highest, effort.ticks, 17, instances.size() > 1), clock_cost, row);
       told(fmt::format("{}, {}, {}: p99.9 {:.1f} us, worst {:.1f} us again {:.1f}", body.name, stroke, law,
                        1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
       rows.push_back(std::move(row));

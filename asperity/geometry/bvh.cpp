@@ -1,4 +1,4 @@
-#include "asperity/geometry/bvh.h"
+#include "asperity/geometry/bvh_search.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "asperity/core/names.h"
-#include "asperity/geometry/bvh.h"
+#include "asperity/geometry/bvh_search.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/geometry/octree.h"
 #include "asperity/geometry/triangle_contact.h"

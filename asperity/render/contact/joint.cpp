@@ -20,13 +20,6 @@ constexpr double rest_of_skin_beside_smooth = 0.05;
 // A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
 constexpr double point_of_grain = 1e-3;
 
-/// Whether one of the same surface with the same direction is there already.
-bool stands_among(const ConstraintPlane& plane, const PlaneSet& planes) noexcept {
-  return std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& other) {
-    return other.owner == plane.owner && other.normal == plane.normal;
-  });
-}
-
 }  // namespace
 
 void JointSolve::add(Touched& touch) noexcept {
@@ -36,6 +29,7 @@ void JointSolve::add(Touched& touch) noexcept {
   entry.near = touch.contact->first();
   if (touch.facts->facets) {
     // As many patches as contacts: never full.
+    facets_ = true;
     entry.patch = patches_->emplace_back();
     entry.patch->start(*relief_of(*touch.instance), touch.instance->law.facets());
     entry.skin = entry.patch->skin();
@@ -52,7 +46,8 @@ void JointSolve::add(Touched& touch) noexcept {
   entries_.push_back(entry);
   if (!entry.smooth) return;
   smooth_ = true;
-  margin_ = std::max({margin_, entry.folds ? point_of_grain * entry.grain : 0.0, 4.0 * entry.skin});
+  margin_ = std::max(margin_, 4.0 * entry.skin);
+  if (entry.folds) blown_up_ = std::max(blown_up_, point_of_grain * entry.grain);
 }
 
 bool JointSolve::complete() const noexcept {
@@ -110,20 +105,25 @@ ConstraintPlane JointSolve::plane_of(std::size_t index, const Foot& contact) con
 }
 
 /// What of its triangles the ball touches.
-void JointSolve::triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept {
+void JointSolve::triangle_planes(std::size_t index, const Vec3& position, double within, PlaneSet& out) noexcept {
   Entry& entry = entries_[index];
   const Touched& touch = *entry.touch;
   const Vec3 local = touch.to_local(position);
   ContactSet contacts;
   if (entry.patch != nullptr) {
-    entry.patch->contacts(local, radius_ + margin_, touch.facts->sides, contacts);
+    entry.patch->contacts(local, within, touch.facts->sides, contacts);
   } else {
-    std::get_if<TriangleView>(&touch.view)->contacts(local, radius_ + margin_, touch.facts->sides, contacts);
+    std::get_if<TriangleView>(&touch.view)->contacts(local, within, touch.facts->sides, contacts);
   }
   for (const Foot& contact : contacts) out.push_back(plane_of(index, contact));
 }
 
 void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
+  if (leads_point()) {
+    if (!attached_) attach(position);
+    planes_at(position, out);
+    return;
+  }
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
     if (entry.smooth) {
@@ -134,7 +134,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
       if (!entry.folds) out.push_back(plane);
       continue;
     }
-    triangle_planes(i, position, out);
+    triangle_planes(i, position, radius_ + margin(), out);
   }
   for (std::size_t i = feet_.size(); i-- > 0;) {
     const ConstraintPlane& plane = feet_[i];
@@ -165,7 +165,7 @@ double JointSolve::free_share_of_ball(Entry& entry, const Segment& motion) noexc
   constexpr int most_strides = 32;
   const Vec3 way = motion.to - motion.from;
   const double length = way.norm();
-  const double inner = 0.5 * (radius_ + margin_);
+  const double inner = 0.5 * (radius_ + margin());
   double gone = 0.0;
   for (int stride = 0; stride < most_strides; ++stride) {
     const Vec3 here = motion.from + gone / length * way;
@@ -193,16 +193,16 @@ double JointSolve::free_share(const Segment& motion) noexcept {
     const Sides sides = touch.facts->sides;
     const Segment local = touch.to_local(motion);
     if (entry.patch != nullptr) {
-      share = std::min(share, entry.patch->segment(local, radius_ + margin_, sides).t);
+      share = std::min(share, entry.patch->segment(local, radius_ + margin(), sides).t);
     } else if (!entry.smooth) {
-      const SweptHit hit = std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin_, sides);
+      const SweptHit hit = std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin(), sides);
       share = std::min(share, hit.t);
       // What stops it may be farther off than what counts as touched.
       if (smooth_ && hit.hit && hit.t < 1.0) remember(plane_of(i, hit.contact));
     } else {
       const SweptHit hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
       // The centre itself must stay outside: half of the ball before what it meets.
-      if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin_) / length));
+      if (hit.hit) share = std::min(share, std::max(0.0, hit.t - 0.5 * (radius_ + margin()) / length));
       // What is thinner than a real ball must not slip past it; what is thinner than a blown-up point is below its
       // skin.
       if (radius_ > 0.25 * entry.grain) share = std::min(share, free_share_of_ball(entry, local));
@@ -233,7 +233,7 @@ bool JointSolve::push_out(Vec3& position) noexcept {
     if (share < 1.0) {
       PlaneSet walls;
       for (std::size_t i = 0; i < entries_.size(); ++i) {
-        if (!entries_[i].smooth) triangle_planes(i, position, walls);
+        if (!entries_[i].smooth) triangle_planes(i, position, radius_ + margin(), walls);
       }
       for (const ConstraintPlane& wall : walls) {
         if (!stands_among(wall, held)) held.push_back(wall);
@@ -385,6 +385,12 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
                                        : rest_of_skin_beside_smooth * entry.skin;
       tolerance_ = std::max(tolerance_, rest);
     }
+    if (leads_point()) {
+      settle_point(goal, solution);
+      explain(goal, solution);
+      if (!solution.settled() && solution.projection.active.empty()) share_out(goal, solution);
+      return solution;
+    }
     settle_among_smooth(goal, solution);
   } else {
     tolerance_ = infinity;
@@ -395,7 +401,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
   // Planes that would have it elsewhere are not all that holds it.
   constexpr double most_gaps = 100.0;
   if (smooth_ &&
-      (solution.projection.point - solution.proxy).norm() > most_gaps * (margin_ + widest_skin_) + tolerance_)
+      (solution.projection.point - solution.proxy).norm() > most_gaps * (margin() + widest_skin_) + tolerance_)
     solution.converged = false;
   if (!solution.settled()) share_out(goal, solution);
   return solution;
@@ -431,6 +437,7 @@ void JointSolve::share_out(const Vec3& goal, ConstraintSolution& solution) noexc
 
 void JointSolve::remember_places(std::size_t index, const ConstraintSolution& solution) noexcept {
   const Entry& entry = entries_[index];
+  if (entry.smooth && leads_point()) return remember_held(index, solution);
   const Touched& touch = *entry.touch;
   OfSurface& state = touch.contact->surface;
   state.places.clear();

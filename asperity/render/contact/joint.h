@@ -40,6 +40,8 @@ class JointSolve {
   [[nodiscard]] bool complete() const noexcept;
   /// Tells the contact of entry `index` where it is touched, or nearest. [servo]
   void remember_places(std::size_t index, const ConstraintSolution& solution) noexcept;
+  /// A place where a point is held, a skin off what holds it: from there it may fly. [servo]
+  [[nodiscard]] Vec3 lifted(const Vec3& position) const noexcept;
 
  private:
   struct Entry {
@@ -53,13 +55,54 @@ class JointSolve {
     Place near;  ///< smooth: found last, to be tried first
   };
 
-  [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin_ + entry.skin; }
+  /// A smooth surface that a point touches: its place there, world frame.
+  struct Held {
+    std::uint32_t owner = 0;
+    Place place;
+    Vec3 point = Vec3::Zero();
+    Vec3 normal = Vec3::Zero();  ///< unit, away from the side that is touched
+  };
+  using HeldSet = FixedVector<Held, 6>;
+  struct Met {
+    bool hit = false;
+    double t = 1.0;
+    std::size_t owner = 0;
+    SweptHit what;
+  };
+  static constexpr std::size_t no_owner = most_contacts;
+  enum class Move { none, nearer, learned };
+
+  /// Whether it is a point, and led along the surfaces themselves.
+  [[nodiscard]] bool leads_point() const noexcept { return radius_ == 0.0 && smooth_ && !facets_; }
+  [[nodiscard]] double margin() const noexcept { return leads_point() ? margin_ : std::max(margin_, blown_up_); }
+  [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin() + entry.skin; }
+  [[nodiscard]] bool touches(const Held& held, const Vec3& position) const noexcept;
+  void hold(std::size_t index, const Place& place, const Vec3& normal, Held& held) const noexcept;
+  void attach(const Vec3& position) noexcept;
+  DescentEnd walk(Held& held, const Vec3& goal, bool may_leave, int moves) const noexcept;
+  [[nodiscard]] ConstraintPlane plane_at(const Held& held) const noexcept;
+  void planes_at(const Vec3& position, PlaneSet& out) noexcept;
+  [[nodiscard]] Met first_met(const Segment& motion, const Held* before, const Held* along) noexcept;
+  [[nodiscard]] Met first_met_between(const Segment& motion, const HeldSet& after) noexcept;
+  std::size_t hold_to(const Met& met) noexcept;
+  [[nodiscard]] bool onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexcept;
+  [[nodiscard]] bool slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept;
+  [[nodiscard]] bool along_crease(std::size_t which, std::size_t stopped, const Vec3& goal, const PlaneSet& planes,
+                                  PlaneProjection& projection) const noexcept;
+  [[nodiscard]] bool fly(const Vec3& goal, Vec3& proxy) noexcept;
+  [[nodiscard]] Move step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
+                                  Vec3& proxy) noexcept;
+  void release(const Vec3& position) noexcept;
+  void settle_point(const Vec3& goal, ConstraintSolution& solution) noexcept;
+  void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
+  void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
+
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
   /// Those of them that are touched, not only near: what friction can hold by.
   void rests_on(const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] ConstraintPlane plane_of(std::size_t index, const Foot& contact) const noexcept;
-  void triangle_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept;
+  void triangle_planes(std::size_t index, const Vec3& position, double within, PlaneSet& out) noexcept;
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
   [[nodiscard]] double free_share_of_ball(Entry& entry, const Segment& motion) noexcept;
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
@@ -82,7 +125,11 @@ class JointSolve {
   bool met_ = false;                      ///< the last advance has found more of them
   double stride_ = 0.0;                   ///< how far that was to go (m)
   bool smooth_ = false;                   ///< any of them is
+  bool facets_ = false;                   ///< any of them is generated
+  HeldSet held_;                          ///< a point: what it touches
+  bool attached_ = false;                 ///< that is known
   double margin_ = 0.0;          ///< by which the ball is blown up, so that a point has a surface of its own (m)
+  double blown_up_ = 0.0;        ///< as much at least, for what may touch two places of one surface at once (m)
   double widest_skin_ = 0.0;     ///< m
   double tolerance_ = infinity;  ///< below which a further move is not worth making (m)
 };

@@ -19,6 +19,12 @@ struct ConstraintPlane {
   Foot contact;                ///< object frame
 };
 using PlaneSet = FixedVector<ConstraintPlane, 24>;
+/// Whether one of the same surface with the same direction is there already. [servo]
+inline bool stands_among(const ConstraintPlane& plane, const PlaneSet& planes) noexcept {
+  return std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& other) {
+    return other.owner == plane.owner && other.normal == plane.normal;
+  });
+}
 
 /// The point nearest to a goal within a set of half-spaces.
 struct PlaneProjection {

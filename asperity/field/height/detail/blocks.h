@@ -10,17 +10,19 @@
 
 namespace asperity {
 
+/// The greatest float, or one or two below it, that is not above a value. [any]
 inline float rounded_down(double value) noexcept {
   const float near = static_cast<float>(value);
   // The relative part is one to two units in the last place; the other one steps where that underflows.
   return static_cast<double>(near) > value ? near - (std::abs(near) * 0x1p-23F + 0x1p-149F) : near;
 }
 
+/// The same from above. [any]
 inline float rounded_up(double value) noexcept {
   return -rounded_down(-value);
 }
 
-/// The blocks of a level along an axis of `texels`.
+/// The blocks of a level along an axis of `texels`. [any]
 inline std::size_t blocks_along(int texels, unsigned level) noexcept {
   return (static_cast<std::size_t>(texels - 1) >> level) + 1;
 }

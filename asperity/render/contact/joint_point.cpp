@@ -1,0 +1,481 @@
+// The joint solve of a point: led along the surfaces themselves, as a point on one surface is, and along the creases
+// between them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "asperity/render/contact/joint.h"
+
+namespace asperity {
+
+namespace {
+
+// Evaluations of one way along a surface: in legs, so that what is in the way is seen before much is walked in vain.
+constexpr int first_leg = 24;
+constexpr int most_walk = 1024;
+// Back to a surface from a place near it.
+constexpr int short_walk = 24;
+
+bool nearer(const Vec3& now, const Vec3& before, const Vec3& goal) noexcept {
+  constexpr double least_gain = 1e-9;
+  return (now - goal).squaredNorm() < (before - goal).squaredNorm() * (1.0 - least_gain);
+}
+
+/// The point nearest to `p` on all of up to three planes. False where they all but agree in direction.
+bool onto_all(const PlaneSet& planes, Vec3& p) noexcept {
+  constexpr double least_angle = 1e-3;
+  // One after another, each along what the ones before leave free.
+  FixedVector<Vec3, 3> across;
+  for (const ConstraintPlane& plane : planes) {
+    Vec3 way = plane.normal;
+    for (const Vec3& other : across) way -= way.dot(other) * other;
+    const double length = way.norm();
+    if (!(length > least_angle) || across.size() == across.capacity()) return false;
+    way /= length;
+    // The earlier planes stay as they are: `way` lies in all of them.
+    p += (plane.offset + plane.skin - plane.normal.dot(p)) / length * way;
+    across.push_back(way);
+  }
+  return true;
+}
+
+}  // namespace
+
+/// Whether a point is where a place is. Walks find that to within a share of the grain, along the surface.
+bool JointSolve::touches(const Held& held, const Vec3& position) const noexcept {
+  constexpr double found_of_grain = 4e-3;
+  const Vec3 apart = position - held.point;
+  const double above = held.normal.dot(apart);
+  const double room = 2.0 * margin();
+  const double aside = room + found_of_grain * entries_[held.owner].grain;
+  return std::abs(above) <= room && (apart - above * held.normal).squaredNorm() <= aside * aside;
+}
+
+void JointSolve::hold(std::size_t index, const Place& place, const Vec3& normal, Held& held) const noexcept {
+  const Touched& touch = *entries_[index].touch;
+  held.owner = static_cast<std::uint32_t>(index);
+  held.place = place;
+  on_smooth_view(touch.view, [&](const auto& view) {
+    const auto& spot = view.at(place, place.side() * touch.turned_back(normal));
+    held.point = touch.to_world(spot.point);
+    held.normal = place.side() * touch.turned(spot.front);
+    return true;
+  });
+}
+
+/// What it touches before it is led anywhere.
+void JointSolve::attach(const Vec3& position) noexcept {
+  attached_ = true;
+  held_.clear();
+  const auto keep = [&](std::size_t index, const Place& place, const Vec3& normal) {
+    Held held;
+    hold(index, place, normal, held);
+    if (touches(held, position)) held_.push_back(held);
+  };
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    if (!entry.smooth) continue;
+    const Touched& touch = *entry.touch;
+    const OfSurface& surface = touch.contact->surface;
+    if (!touch.moved) {
+      for (const Place& place : surface.places) {
+        if (place.known()) keep(i, place, touch.turned(surface.normal));
+      }
+      continue;
+    }
+    const Vec3 local = touch.to_local(position);
+    const Foot foot =
+        on_smooth_view(touch.view, [&](const auto& view) { return view.nearest(local, 2.0 * margin(), entry.near); });
+    if (!foot.found()) continue;
+    const bool back =
+        on_smooth_view(touch.view, [&](const auto& view) { return foot.normal.dot(view.front(foot)) < 0.0; });
+    if (!back || touch.facts->sides == Sides::both) keep(i, {foot.element, back, foot.at}, touch.turned(foot.normal));
+  }
+}
+
+DescentEnd JointSolve::walk(Held& held, const Vec3& goal, bool may_leave, int moves) const noexcept {
+  const Touched& touch = *entries_[held.owner].touch;
+  return on_smooth_view(touch.view, [&](const auto& view) {
+    using Spot = typename std::decay_t<decltype(view)>::Spot;
+    Spot spot = view.at(held.place, held.place.side() * touch.turned_back(held.normal));
+    const DescentEnd end = view.descend(
+        held.place, spot,
+        {.point = touch.to_local(goal), .may_leave = may_leave, .sides = touch.facts->sides, .moves = moves});
+    held.point = touch.to_world(spot.point);
+    held.normal = held.place.side() * touch.turned(spot.front);
+    return end;
+  });
+}
+
+ConstraintPlane JointSolve::plane_at(const Held& held) const noexcept {
+  const Touched& touch = *entries_[held.owner].touch;
+  return {held.normal,
+          held.normal.dot(held.point),
+          0.0,
+          held.owner,
+          {touch.to_local(held.point), touch.turned_back(held.normal), 0.0, held.place.element, held.place.at}};
+}
+
+/// Planes of what the point touches: first those of `held_`, in their order.
+void JointSolve::planes_at(const Vec3& position, PlaneSet& out) noexcept {
+  out.clear();
+  for (const Held& held : held_) out.push_back(plane_at(held));
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (!entries_[i].smooth) triangle_planes(i, position, margin(), out);
+  }
+  for (const ConstraintPlane& wall : feet_) {
+    if (!stands_among(wall, out)) out.push_back(wall);
+  }
+}
+
+/// What a point meets first on its way; of the surface that it goes along (`along`, from where it was there) only what
+/// overlaps it.
+JointSolve::Met JointSolve::first_met(const Segment& motion, const Held* before, const Held* along) noexcept {
+  Met met;
+  const double length = (motion.to - motion.from).norm();
+  if (length == 0.0) return met;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    const Touched& touch = *entry.touch;
+    const Sides sides = touch.facts->sides;
+    SweptHit hit;
+    if (!entry.smooth) {
+      hit = std::get_if<TriangleView>(&touch.view)->sweep(touch.to_local(motion), margin(), sides);
+    } else if (along != nullptr && along->owner == i) {
+      const auto* relief = std::get_if<ReliefView>(&touch.view);
+      if (relief == nullptr || !relief->overlaps()) continue;
+      hit = relief->between(before->place, relief->at(before->place), along->place, relief->at(along->place), sides);
+    } else {
+      // From a little above what it touches there.
+      Segment local = touch.to_local(motion);
+      for (const Held& held : held_) {
+        if (held.owner != i) continue;
+        const double short_of = 0.5 * entry.skin - held.normal.dot(motion.from - held.point);
+        if (short_of > 0.0) local.from += short_of * touch.turned_back(held.normal);
+      }
+      hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
+      if (hit.hit && hit.contact.normal.isZero()) hit.hit = false;
+    }
+    if (!hit.hit || !(hit.t < met.t || !met.hit)) continue;
+    met = {true, hit.t, i, hit};
+  }
+  return met;
+}
+
+/// Holds it to what it has met; of the same place before, only the newer.
+std::size_t JointSolve::hold_to(const Met& met) noexcept {
+  const Touched& touch = *entries_[met.owner].touch;
+  const Foot& contact = met.what.contact;
+  Held held;
+  hold(met.owner, {contact.element, met.what.side < 0.0, contact.at}, touch.turned(contact.normal), held);
+  constexpr double same_direction = 0.999;
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    if (held_[i].owner != held.owner || !(held_[i].normal.dot(held.normal) > same_direction)) continue;
+    held_[i] = held;
+    return i;
+  }
+  if (held_.size() == held_.capacity()) held_.swap_remove(0);
+  held_.push_back(held);
+  return held_.size() - 1;
+}
+
+/// From near them onto all of the surfaces that `on` names, and as near as it can to where it is: Newton's steps on
+/// their tangent planes. `walls`: of triangles, which it stays on as well.
+bool JointSolve::onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexcept {
+  constexpr int most_steps = 8;
+  Vec3 p = position;
+  for (int step = 0; step < most_steps; ++step) {
+    PlaneSet planes = walls;
+    double off = 0.0;
+    for (Held& held : on) {
+      walk(held, p, false, short_walk);
+      const ConstraintPlane plane = plane_at(held);
+      off = std::max(off, std::abs(held.normal.dot(p - held.point)) / entries_[held.owner].skin);
+      planes.push_back(plane);
+    }
+    for (const ConstraintPlane& wall : walls)
+      off = std::max(off, std::abs(wall.normal.dot(p) - wall.offset - wall.skin) / entries_[wall.owner].skin);
+    if (off <= 0.1) {
+      position = p;
+      return true;
+    }
+    if (planes.size() == 1 && walls.empty()) {
+      position = on[0].point;
+      return true;
+    }
+    if (!onto_all(planes, p)) return false;
+  }
+  return false;
+}
+
+/// Along one surface to the goal, or to what is in the way: `stopped`, then. Whether it came to rest on it.
+bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept {
+  stopped = no_owner;
+  for (int walked = 0, leg = first_leg; walked < most_walk; walked += leg, leg *= 2) {
+    const Held before = held_[which];
+    Held& held = held_[which];
+    const DescentEnd end = walk(held, goal, true, leg);
+    const Met met = first_met({before.point, held.point}, &before, &held);
+    if (!met.hit) {
+      proxy = held.point;
+      if (end != DescentEnd::limited) return end != DescentEnd::left;
+      continue;
+    }
+    stopped = met.owner;
+    // To where the two meet; or else, from where it was, by planes that hold both.
+    Vec3 crease = before.point + met.t * (held.point - before.point);
+    held = before;
+    proxy = before.point;
+    HeldSet on;
+    on.push_back(before);
+    PlaneSet walls;
+    std::size_t other = held_.size();
+    if (entries_[met.owner].smooth) {
+      other = hold_to(met);
+      if (other == which) return false;
+      on.push_back(held_[other]);
+    } else {
+      walls.push_back(plane_of(met.owner, met.what.contact));
+    }
+    if (!onto(on, walls, crease)) return false;
+    held_[which] = on[0];
+    if (on.size() > 1) held_[other] = on[1];
+    proxy = crease;
+    return false;
+  }
+  return false;
+}
+
+Vec3 JointSolve::lifted(const Vec3& position) const noexcept {
+  Vec3 out = position;
+  for (const Held& held : held_) {
+    const double skin = entries_[held.owner].skin;
+    out += std::max(0.0, skin - held.normal.dot(out - held.point)) * held.normal;
+  }
+  return out;
+}
+
+/// Straight to the goal through free space. Whether it got there.
+bool JointSolve::fly(const Vec3& goal, Vec3& proxy) noexcept {
+  const Vec3 start = lifted(proxy);
+  held_.clear();
+  const Met met = first_met({start, goal}, nullptr, nullptr);
+  if (!met.hit) {
+    proxy = goal;
+    return true;
+  }
+  if (entries_[met.owner].smooth) {
+    proxy = held_[hold_to(met)].point;
+  } else {
+    proxy = start + met.t * (goal - start);
+  }
+  return false;
+}
+
+/// Along the crease between what holds it, or a part of the way.
+JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
+                                          Vec3& proxy) noexcept {
+  constexpr double most_grains = 4.0;
+  Vec3 step = projection.point - proxy;
+  PlaneSet walls;
+  FixedVector<std::size_t, 3> holding;
+  for (const PlaneProjection::Active& active : projection.active) {
+    if (active.plane >= held_.size()) {
+      walls.push_back(planes[active.plane]);
+      continue;
+    }
+    holding.push_back(active.plane);
+    const double most = most_grains * entries_[held_[active.plane].owner].grain;
+    if (step.norm() > most) step *= most / step.norm();
+  }
+  const auto holds = [&](std::size_t which) {
+    return std::find(holding.begin(), holding.end(), which) != holding.end();
+  };
+  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    HeldSet after = held_;
+    HeldSet on;
+    for (const std::size_t which : holding) on.push_back(held_[which]);
+    Vec3 next = proxy + step;
+    bool good = onto(on, walls, next) && nearer(next, proxy, goal);
+    for (std::size_t i = 0; good && i < held_.size(); ++i) {
+      if (holds(i)) continue;
+      walk(after[i], next, false, short_walk);
+      good = after[i].normal.dot(next - after[i].point) >= -0.1 * entries_[after[i].owner].skin;
+    }
+    for (std::size_t k = 0; k < holding.size(); ++k) after[holding[k]] = on[k];
+    if (good) {
+      const Met met = first_met_between({proxy, next}, after);
+      if (!met.hit) {
+        held_ = after;
+        proxy = next;
+        return Move::nearer;
+      }
+      if (entries_[met.owner].smooth) {
+        hold_to(met);
+        return Move::learned;
+      }
+      const ConstraintPlane wall = plane_of(met.owner, met.what.contact);
+      if (!stands_among(wall, planes)) {
+        remember(wall);
+        return Move::learned;
+      }
+      step *= std::max(0.0, met.t - 1e-3);
+      if (step.norm() <= tolerance_) break;
+      continue;
+    }
+    step *= 0.35;
+    if (step.norm() <= tolerance_) break;
+  }
+  return Move::none;
+}
+
+/// What is in the way from one place between surfaces to another: nothing that holds it there.
+JointSolve::Met JointSolve::first_met_between(const Segment& motion, const HeldSet& after) noexcept {
+  Met met;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    const Touched& touch = *entry.touch;
+    SweptHit hit;
+    if (!entry.smooth) {
+      hit = std::get_if<TriangleView>(&touch.view)->sweep(touch.to_local(motion), margin(), touch.facts->sides);
+    } else {
+      bool held = false;
+      for (std::size_t k = 0; k < held_.size(); ++k) {
+        if (held_[k].owner != i) continue;
+        held = true;
+        const auto* relief = std::get_if<ReliefView>(&touch.view);
+        if (relief == nullptr || !relief->overlaps()) continue;
+        const SweptHit fold = relief->between(held_[k].place, relief->at(held_[k].place), after[k].place,
+                                              relief->at(after[k].place), touch.facts->sides);
+        if (fold.hit && (!hit.hit || fold.t < hit.t)) hit = fold;
+      }
+      if (!held)
+        hit = on_smooth_view(
+            touch.view, [&](const auto& view) { return view.first_touch(touch.to_local(motion), touch.facts->sides); });
+      if (hit.hit && hit.contact.normal.isZero()) hit.hit = false;
+    }
+    if (hit.hit && (!met.hit || hit.t < met.t)) met = {true, hit.t, i, hit};
+  }
+  return met;
+}
+
+/// Knows of what it touches where it is now, and forgets the rest.
+void JointSolve::release(const Vec3& position) noexcept {
+  for (std::size_t i = held_.size(); i-- > 0;) {
+    if (held_[i].point != position) walk(held_[i], position, false, short_walk);
+    if (!touches(held_[i], position)) held_.swap_remove(i);
+  }
+}
+
+/// The goal's nearest place on the crease between one surface that holds the point and what has stopped it there,
+/// though its plane, as it is known, would let it pass. False where there is none.
+bool JointSolve::along_crease(std::size_t which, std::size_t stopped, const Vec3& goal, const PlaneSet& planes,
+                              PlaneProjection& projection) const noexcept {
+  std::size_t other = planes.size();
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    if (i != which && planes[i].owner == stopped) other = i;
+  }
+  if (other == planes.size()) return false;
+  PlaneSet both;
+  both.push_back(planes[which]);
+  both.push_back(planes[other]);
+  Vec3 target = goal;
+  if (!onto_all(both, target)) return false;
+  projection.point = target;
+  projection.active.clear();
+  projection.active.push_back({which, 0.0});
+  projection.active.push_back({other, 0.0});
+  return true;
+}
+
+void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) noexcept {
+  constexpr int most_moves = 64;
+  constexpr int most_idle = 2;
+  constexpr double short_slide = 0.1;  // of what it was to go
+  if (!attached_) attach(solution.proxy);
+  Vec3& proxy = solution.proxy;
+  PlaneSet& planes = solution.planes;
+  if (held_.size() == 1) proxy = held_[0].point;
+  int idle = 0;
+  std::size_t stopped = no_owner;
+  for (int move = 0; move < most_moves && !solution.converged; ++move) {
+    planes_at(proxy, planes);
+    PlaneProjection projection = project_onto_planes(goal, planes, true);
+    const Vec3 before = proxy;
+    const Vec3 step = projection.point - proxy;
+    if (projection.active.empty()) {
+      solution.converged = fly(goal, proxy);
+    } else if (step.norm() <= tolerance_) {
+      solution.converged = true;
+      return;
+    } else {
+      std::size_t lead = held_.size();
+      double strongest = 0.0;
+      for (const PlaneProjection::Active& active : projection.active) {
+        if (active.plane >= held_.size() || !(active.multiplier > strongest)) continue;
+        strongest = active.multiplier;
+        lead = active.plane;
+      }
+      const bool crease = projection.active.size() > 1 || lead == held_.size() ||
+                          (stopped != no_owner && along_crease(lead, stopped, goal, planes, projection));
+      const Move way = crease ? step_between(planes, projection, goal, proxy) : Move::none;
+      if (way == Move::learned) continue;
+      if (way == Move::none && lead < held_.size()) {
+        solution.converged = slide(lead, goal, proxy, stopped);
+        if ((proxy - before).norm() > short_slide * step.norm()) stopped = no_owner;
+      }
+    }
+    release(proxy);
+    if (nearer(proxy, before, goal)) {
+      idle = 0;
+      feet_.clear();
+    } else if (++idle == most_idle) {
+      // No motion comes nearer: a local minimum, found by trying.
+      solution.converged = true;
+    }
+  }
+  planes_at(proxy, planes);
+}
+
+void JointSolve::remember_held(std::size_t index, const ConstraintSolution& solution) noexcept {
+  const Touched& touch = *entries_[index].touch;
+  OfSurface& state = touch.contact->surface;
+  state.places.clear();
+  double strongest = 0.0;
+  for (const PlaneProjection::Active& active : solution.projection.active) {
+    const ConstraintPlane& plane = solution.planes[active.plane];
+    if (plane.owner != index || !(active.multiplier > strongest)) continue;
+    strongest = active.multiplier;
+    state.normal = touch.turned_back(plane.normal);
+  }
+  for (const Held& held : held_) {
+    if (held.owner == index) state.places.push_back(held.place);
+  }
+}
+
+/// What the planes do not explain the spring holds: it runs to where the proxy is.
+void JointSolve::explain(const Vec3& goal, ConstraintSolution& solution) noexcept {
+  const Vec3& proxy = solution.proxy;
+  solution.projection = project_onto_planes(goal, solution.planes, false);
+  const Vec3 spring = proxy - goal;
+  const double length = spring.norm();
+  if ((solution.projection.point - proxy).norm() <= tolerance_ + margin() + widest_skin_) return;
+  if (solution.projection.active.size() <= 1 && !solution.planes.empty()) {
+    // At the bottom of a valley, at a rim: held along the spring.
+    const std::size_t which = solution.projection.active.empty() ? 0 : solution.projection.active[0].plane;
+    ConstraintPlane& plane = solution.planes[which];
+    plane.normal = spring / length;
+    plane.offset = plane.normal.dot(proxy);
+    plane.skin = 0.0;
+    solution.projection.point = proxy;
+    solution.projection.active.clear();
+    solution.projection.active.push_back({which, length});
+    solution.projection.feasible = true;
+    return;
+  }
+  for (ConstraintPlane& plane : solution.planes) plane.offset = plane.normal.dot(proxy);
+  solution.projection = project_onto_planes(goal, solution.planes, false);
+  solution.projection.feasible = false;
+}
+
+}  // namespace asperity
