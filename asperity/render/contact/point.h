@@ -29,7 +29,10 @@ class PointProxy {
 
   PointRest run(const Vec3& from) noexcept {
     // One tick may leave the surface and meet it again this often: over a field of needles.
-    constexpr int most_flights = 16;
+    constexpr int most_flights = 64;
+    // Nor does it get away from where two folds all but touch by flying to and fro between them.
+    constexpr int most_in_vain = 3;
+    int in_vain = 0;
     if (state_.rests) {
       place_ = state_.places[0];
       spot_ = view_.at(place_, place_.side() * state_.normal);
@@ -57,7 +60,14 @@ class PointProxy {
       Vec3 start;
       // Where there is no place to fly from it stays.
       if (!view_.launch(place_, spot_, start)) return resting(true);
+      if (pinched(start)) start = spot_.point;
+      const Vec3 left = spot_.point;
       if (!fly(start)) return free();
+      if ((spot_.point - left).norm() > 4.0 * view_.skin()) {
+        in_vain = 0;
+      } else if (++in_vain == most_in_vain) {
+        break;
+      }
     }
     return resting(false);
   }
@@ -69,6 +79,10 @@ class PointProxy {
  private:
   /// Evaluations that one way along a surface may take.
   static constexpr int most_walk = 1024;
+  /// Moves between overlapping folds that one tick may take, over all of its flights.
+  static constexpr int most_moves_of_tick = 48;
+  /// Evaluations of one way along a crease.
+  static constexpr int short_walk = 72;
   static constexpr bool on_triangles = requires(const View& v, const Place& p) { v.within_face(p); };
 
   [[nodiscard]] Vec3 normal() const noexcept { return place_.side() * spot_.front; }
@@ -82,6 +96,13 @@ class PointProxy {
     take(hit);
     state_.rests = true;
     return true;
+  }
+
+  /// Whether another fold lies between where it is and where it would fly from.
+  [[nodiscard]] bool pinched(const Vec3& start) const noexcept {
+    if constexpr (requires { view_.overlaps(); })
+      return view_.overlaps() && view_.first_touch({spot_.point, start}, sides_).hit;
+    return false;
   }
 
   void take(const SweptHit& hit) noexcept {
@@ -132,8 +153,9 @@ class PointProxy {
   /// them. Each move comes nearer.
   [[gnu::noinline]] DescentEnd settle_over_folds() noexcept {
     constexpr int most_moves = 24;
+    constexpr double most_grains = 16.0;
     recall_flanks();
-    for (int move = 0; move < most_moves; ++move) {
+    for (int move = 0; move < most_moves && moves_ < most_moves_of_tick; ++move, ++moves_) {
       PlaneSet planes;
       planes.push_back(plane_of(spot_, normal()));
       for (const Flank& flank : flanks_) planes.push_back(plane_of(flank.spot, flank.normal()));
@@ -147,21 +169,13 @@ class PointProxy {
         if (way == Way::on) continue;
         return way == Way::free ? end : DescentEnd::rest;
       }
-      const Vec3 target = along_crease(held);
-      if ((target - spot_.point).norm() <= view_.skin()) return DescentEnd::rest;
-      const Place place = place_;
-      const Spot spot = spot_;
-      DescentEnd end = DescentEnd::rest;
-      const Way way = go(end, [&](int moves) {
-        return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves});
-      });
-      if (way == Way::on) continue;
-      if (way == Way::stuck) return DescentEnd::rest;
-      if (!nearer(spot)) {
-        place_ = place;
-        spot_ = spot;
-        return DescentEnd::rest;
-      }
+      Vec3 way = along_crease(held) - spot_.point;
+      const double most = most_grains * view_.grain();
+      if (way.norm() > most) way *= most / way.norm();
+      if (way.norm() <= view_.skin()) return DescentEnd::rest;
+      const Way end = go_along(way);
+      if (end == Way::on) continue;
+      if (end == Way::stuck) return DescentEnd::rest;
       for (Flank& flank : flanks_) view_.descend(flank.place, flank.spot, {.point = spot_.point, .may_leave = false});
     }
     return DescentEnd::limited;
@@ -216,9 +230,25 @@ class PointProxy {
     on,     ///< another fold: it goes on from there, on that one and beside the one that it was on
     stuck,  ///< another fold, no nearer: it is where it was
   };
+  /// Along a crease; `stuck` where that comes no nearer.
+  Way go_along(const Vec3& step) noexcept {
+    const Place place = place_;
+    const Spot spot = spot_;
+    const Vec3 target = spot.point + step;
+    DescentEnd end = DescentEnd::rest;
+    const Way way = go(
+        end,
+        [&](int moves) { return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves}); },
+        short_walk);
+    if (way == Way::on || (way == Way::free && nearer(spot))) return way;
+    place_ = place;
+    spot_ = spot;
+    return Way::stuck;
+  }
+
   /// In legs, so that what is in the way is seen before much has been walked in vain.
   template <class Lead>
-  Way go(DescentEnd& end, const Lead& lead) noexcept {
+  Way go(DescentEnd& end, const Lead& lead, int most = most_walk) noexcept {
     constexpr int first_leg = 24;
     const Spot begin = spot_;
     Place place;
@@ -229,7 +259,7 @@ class PointProxy {
       spot = spot_;
       end = lead(leg);
       hit = view_.between(place, spot, place_, spot_, sides_);
-      if (end != DescentEnd::limited || walked + leg >= most_walk) break;
+      if (end != DescentEnd::limited || walked + leg >= most) break;
     }
     if (!hit.hit) return Way::free;
     Flank left{place, spot};
@@ -271,6 +301,7 @@ class PointProxy {
   Place place_;
   Spot spot_;
   FixedVector<Flank, 2> flanks_;
+  int moves_ = 0;  ///< between overlapping folds
 };
 
 }  // namespace asperity

@@ -41,8 +41,9 @@ HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) 
                 own.weight * jet.vv + 2.0 * own.v * jet.v};
   for_each_partner(frame, u, v, [&](std::uint32_t other) {
     const ShellPrism prism = shell_.prism(mesh, other);
-    const Projection at = project(frame.prism, u, v, prism);
-    if (!at.seen) return;
+    const ProjectedPlace place = project_place(frame.prism, u, v, prism);
+    if (!place.seen || !has_say(bands_[other], place.u, place.v)) return;
+    const Projection at = with_changes(place, frame.prism);
     PlaceWeight there = place_weight(stitching, bands_[other], at.u, at.v);
     if (there.weight <= 0.0) return;
     const HeightJet heights = coat_.jet(coat_.frame(rest_.mesh(), other, frame.coat.moment), at.u, at.v);

@@ -42,30 +42,65 @@ struct Projection {
 // Faces that are seen more aslant than this have no say.
 inline constexpr double least_cosine = 0.02;
 
+/// The first half of a projection: where the place lies.
+struct ProjectedPlace {
+  bool seen = false;
+  double u = 0.0;
+  double v = 0.0;
+  double rise = 0.0;  ///< along `direction`
+  double facing = 0.0;
+  Vec3 direction;
+  Vec3 cross;  ///< of the other triangle's edges
+  Vec3 gradient_u;
+  Vec3 gradient_v;
+};
+
 /// [servo]
-inline Projection project(const ShellPrism& from, double u, double v, const ShellPrism& onto) noexcept {
-  const Vec3 direction = from.direction_at(u, v);
-  const Vec3 cross = onto.edge_u.cross(onto.edge_v);
-  const double facing = cross.dot(direction);
-  const double area = cross.squaredNorm();
-  Projection answer;
-  if (!(facing > 0.0) || facing * facing <= least_cosine * least_cosine * area * direction.squaredNorm()) return answer;
+inline ProjectedPlace project_place(const ShellPrism& from, double u, double v, const ShellPrism& onto) noexcept {
+  ProjectedPlace answer;
+  answer.direction = from.direction_at(u, v);
+  answer.cross = onto.edge_u.cross(onto.edge_v);
+  answer.facing = answer.cross.dot(answer.direction);
+  const double area = answer.cross.squaredNorm();
+  if (!(answer.facing > 0.0) ||
+      answer.facing * answer.facing <= least_cosine * least_cosine * area * answer.direction.squaredNorm())
+    return answer;
   const Vec3 offset = from.base_at(u, v) - onto.corner;
-  const double rise = -cross.dot(offset) / facing;
-  const Vec3 there = offset + rise * direction;
-  const Vec3 gradient_u = onto.edge_v.cross(cross) / area;
-  const Vec3 gradient_v = cross.cross(onto.edge_u) / area;
+  answer.rise = -answer.cross.dot(offset) / answer.facing;
+  const Vec3 there = offset + answer.rise * answer.direction;
+  answer.gradient_u = onto.edge_v.cross(answer.cross) / area;
+  answer.gradient_v = answer.cross.cross(onto.edge_u) / area;
   answer.seen = true;
-  answer.u = gradient_u.dot(there);
-  answer.v = gradient_v.dot(there);
+  answer.u = answer.gradient_u.dot(there);
+  answer.v = answer.gradient_v.dot(there);
+  return answer;
+}
+
+/// The second half: how that changes. [servo]
+inline Projection with_changes(const ProjectedPlace& place, const ShellPrism& from) noexcept {
+  Projection answer{place.seen, place.u, place.v, Vec2::Zero(), Vec2::Zero()};
+  if (!place.seen) return answer;
   const auto change = [&](const Vec3& edge, const Vec3& turn) {
-    const double rise_change = -(cross.dot(edge) + rise * cross.dot(turn)) / facing;
-    const Vec3 moved = edge + rise * turn + rise_change * direction;
-    return Vec2(gradient_u.dot(moved), gradient_v.dot(moved));
+    const double rise_change = -(place.cross.dot(edge) + place.rise * place.cross.dot(turn)) / place.facing;
+    const Vec3 moved = edge + place.rise * turn + rise_change * place.direction;
+    return Vec2(place.gradient_u.dot(moved), place.gradient_v.dot(moved));
   };
   answer.by_u = change(from.edge_u, from.turn_u);
   answer.by_v = change(from.edge_v, from.turn_v);
   return answer;
+}
+
+/// [servo]
+inline Projection project(const ShellPrism& from, double u, double v, const ShellPrism& onto) noexcept {
+  return with_changes(project_place(from, u, v, onto), from);
+}
+
+/// Whether a face has a say at a place in its coordinates: some do not, however wide its bands. [servo]
+inline bool has_say(const StitchBand& band, double u, double v) noexcept {
+  for (int k = 0; k < 3; ++k) {
+    if (coordinate(k, u, v) + static_cast<double>(band.rho[k]) < 0.0) return false;
+  }
+  return true;
 }
 
 /// Heights as they are rendered where the relief had to be lowered. [servo]
