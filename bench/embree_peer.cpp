@@ -1,6 +1,7 @@
 #include "bench/embree_peer.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "asperity/geometry/closest_point.h"
 #include "bench/measure.h"
@@ -39,6 +40,11 @@ void fill(RTCGeometry geometry, const TriangleMesh& mesh) {
   }
 }
 
+bool count_bytes(void* total, ssize_t bytes, bool /*post*/) {
+  *static_cast<std::int64_t*>(total) += bytes;
+  return true;
+}
+
 }  // namespace
 
 EmbreePeer::EmbreePeer(const TriangleMesh& mesh)
@@ -70,6 +76,49 @@ double EmbreePeer::closest(const Vec3& p, double bound) const {
   rtcInitPointQueryContext(&context);
   rtcPointQuery(scene_, &query, &context, nullptr, &search);
   return search.squared_distance < bound * bound ? std::sqrt(search.squared_distance) : infinity;
+}
+
+EmbreeRays::EmbreeRays(std::span<const Vertex> vertices, std::span<const std::array<std::uint32_t, 3>> triangles)
+    : device_(rtcNewDevice("threads=1,start_threads=0")) {
+  rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes_);
+  const Clock::time_point start = Clock::now();
+  scene_ = rtcNewScene(device_);
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const auto copy = [&](RTCBufferType type, RTCFormat format, const auto& items) {
+    void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(items[0]), items.size());
+    std::memcpy(buffer, items.data(), items.size_bytes());
+  };
+  copy(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices);
+  copy(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene_, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene_);
+  build_seconds_ = std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+EmbreeRays::~EmbreeRays() {
+  rtcReleaseScene(scene_);
+  rtcReleaseDevice(device_);
+}
+
+double EmbreeRays::first_hit(const Segment& segment) const {
+  const Eigen::Vector3f from = segment.from.cast<float>();
+  const Eigen::Vector3f along = (segment.to - segment.from).cast<float>();
+  RTCRayHit query{};
+  query.ray.org_x = from.x();
+  query.ray.org_y = from.y();
+  query.ray.org_z = from.z();
+  query.ray.dir_x = along.x();
+  query.ray.dir_y = along.y();
+  query.ray.dir_z = along.z();
+  query.ray.tfar = 1.0F;
+  query.ray.mask = ~0U;
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene_, &context, &query);
+  return query.hit.geomID != RTC_INVALID_GEOMETRY_ID ? static_cast<double>(query.ray.tfar) : infinity;
 }
 
 }  // namespace asperity::bench

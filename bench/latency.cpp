@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/rays_rows.h"
 #include "bench/real_rows.h"
 #include "bench/report.h"
 #ifdef ASPERITY_HAS_OPENVDB
@@ -112,6 +113,21 @@ Status measure_all(const Options& options, Report& report) {
   }
   say("");
   say("\r");
+  if (asked("rays") && options.counted == 0) {
+    RayEffort rays;
+    if (options.quick) {
+      rays.width = 60;
+      rays.height = 40;
+      rays.pictures = 2;
+      rays.most_triangles = std::size_t{1} << 19U;
+      rays.map_size = 64;
+      rays.sphere_alone = true;
+    }
+    rays.data = options.real.data;
+    rays.only = options.real.only;
+    const auto told = [](std::string_view what) { fmt::print(stderr, "{}\n", what); };
+    ASPERITY_TRY(report.rays, measure_rays(rays, report.clock_cost, told));
+  }
   return success();
 }
 
@@ -187,13 +203,15 @@ int main(int argc, char** argv) {
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
     app.add_option("--only", options.only,
-                   "One kind of rows: mesh, relief, volume, potential, fine, formula, refit or real")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "real"}));
-    app.add_option("--data", options.real.data, "real: folder of meshes, textures and volumes")->capture_default_str();
+                   "One kind of rows: mesh, relief, volume, potential, fine, formula, refit, rays or real")
+        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "rays", "real"}));
+    app.add_option("--data", options.real.data, "real, rays: folder of meshes, textures and volumes")
+        ->capture_default_str();
     app.add_option("--ticks", options.real.ticks, "real: ticks a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();
-    app.add_option("--rows", options.real.only, "real: rows whose \"body, stroke, law\" holds this text");
+    app.add_option("--rows", options.real.only,
+                   "real: rows whose \"body, stroke, law\" holds this text; rays: whose body does");
     app.add_flag("--every", options.real.every, "real: every pair of strokes and laws");
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))

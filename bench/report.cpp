@@ -72,6 +72,35 @@ Json json_of(const Group& group) {
           {"rows", rows}};
 }
 
+Json json_of(const RaySpeed& speed) {
+  return {{"rays_per_s", speed.rays_a_second}, {"hit_share", speed.hit_share}, {"worst_ns", speed.worst}};
+}
+
+Json json_of(const RayRow& row) {
+  Json relief = json_of(row.relief);
+  relief["bytes"] = row.relief_bytes;
+  relief["build_s"] = row.relief_build_seconds;
+  Json embree = json_of(row.embree);
+  embree["triangles"] = row.triangles;
+  embree["texels_an_edge"] = row.texels_an_edge;
+  embree["capped"] = row.capped;
+  embree["triangle_bytes"] = row.triangle_bytes;
+  embree["bytes"] = row.embree_bytes;
+  embree["cut_s"] = row.cut_seconds;
+  embree["build_s"] = row.embree_build_seconds;
+  return {{"body", row.body},
+          {"faces", row.faces},
+          {"texel_m", row.texel},
+          {"rays", row.rays},
+          {"both_share", row.both_share},
+          {"relief", relief},
+          {"embree", embree},
+          {"difference_p50_m", row.difference_p50},
+          {"difference_p99_m", row.difference_p99},
+          {"flatness_p50_m", row.flatness_p50},
+          {"flatness_p99_m", row.flatness_p99}};
+}
+
 std::string text_of(const Group& group) {
   std::string text = fmt::format("\n{} of {}: ", group.kind, group.size());
   if (group.resolution == 0) text += fmt::format("{:.1f} bytes a triangle", group.bytes_per_triangle);
@@ -132,7 +161,7 @@ std::vector<Ratio> Report::ratios() const {
 }
 
 std::vector<std::string> Report::failures() const {
-  std::vector<std::string> failures;
+  std::vector<std::string> failures = ray_failures(rays);
   for (const Group& group : groups) {
     for (const RowResult& row : group.rows) {
       if (row.warm.updates == 0 || row.cold.updates == 0)
@@ -156,12 +185,13 @@ std::vector<std::string> Report::failures() const {
 }
 
 std::string Report::text() const {
-  std::string text = fmt::format(
-      "{}\n{}, {}\nProbe 1 mm under a sphere of radius 50 mm, 50 mm/s, 1 kHz. Cold: 64 MB swept before every "
-      "update.\n"
-      "One reading of the clock costs {:.0f} ns, which is taken off.\n",
-      command, machine, date, clock_cost);
+  std::string text = fmt::format("{}\n{}, {}\n", command, machine, date);
+  if (!groups.empty()) {
+    text += "Probe 1 mm under a sphere of radius 50 mm, 50 mm/s, 1 kHz. Cold: 64 MB swept before every update.\n";
+  }
+  text += fmt::format("One reading of the clock costs {:.0f} ns, which is taken off.\n", clock_cost);
   for (const Group& group : groups) text += text_of(group);
+  text += rays_text(rays);
   constexpr double owed = 80.0;  // ns, texture and friction together
   for (const Group& group : groups) {
     if (group.on_top.empty()) continue;
@@ -171,7 +201,7 @@ std::string Report::text() const {
                           extra.nanoseconds <= owed ? "" : ", missed");
     }
   }
-  text += "\nRatios of warm medians\n";
+  if (!groups.empty()) text += "\nRatios of warm medians\n";
   for (const Ratio& ratio : ratios()) {
     text += fmt::format("{:<78}{:>6.2f}", ratio.what, ratio.value);
     if (ratio.bar > 0.0)
@@ -194,9 +224,11 @@ std::string Report::json() const {
   for (const Group& group : groups) {
     for (const Extra& extra : group.on_top) extras_json.push_back({{"what", extra.what}, {"ns", extra.nanoseconds}});
   }
+  Json rays_json = Json::array();
+  for (const RayRow& row : rays) rays_json.push_back(json_of(row));
   const Json report = {{"command", command},          {"machine", machine},    {"date", date},
                        {"clock_cost_ns", clock_cost}, {"groups", groups_json}, {"on_top", extras_json},
-                       {"ratios", ratios_json}};
+                       {"ratios", ratios_json},       {"rays", rays_json}};
   return report.dump(2);
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/rays_rows.h"
 #include "bench/rows.h"
 
 namespace asperity::bench {
@@ -22,10 +23,11 @@ struct Report {
   std::string command;
   double clock_cost = 0.0;  ///< ns, already taken off every time
   std::vector<Group> groups;
+  std::vector<RayRow> rays;
 
   [[nodiscard]] std::vector<Ratio> ratios() const;
   /// What does not hold, one sentence each: a row that did not answer, distances that disagree, a ratio over its
-  /// margin.
+  /// margin, what ray_failures() says.
   [[nodiscard]] std::vector<std::string> failures() const;
   [[nodiscard]] std::string text() const;
   [[nodiscard]] std::string json() const;
