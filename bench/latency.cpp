@@ -127,6 +127,8 @@ Status measure_all(const Options& options, Report& report) {
     rays.only = options.real.only;
     const auto told = [](std::string_view what) { fmt::print(stderr, "{}\n", what); };
     ASPERITY_TRY(report.rays, measure_rays(rays, report.clock_cost, told));
+    if (options.only == "rays" && report.rays.empty())
+      return bad_value("leaves no body to cast rays on", "--rows", "part of a name that a run without it prints");
   }
   return success();
 }

@@ -25,6 +25,7 @@ struct CompareOptions {
   std::vector<std::string> laws;
   std::string out;
   bool no_report = false;
+  bool no_picture = false;
   bool one_way = false;
 };
 
@@ -290,8 +291,10 @@ Result<int> compare(const CompareOptions& options, const Console& console) {
     for (const Column& column : columns) report.entries.push_back(column.entry);
     report.loop_rates = rates;
     report.detection = detection;
-    ASPERITY_TRY(report.picture,
-                 render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
+    if (!options.no_picture) {
+      ASPERITY_TRY(report.picture,
+                   render_picture(experiment.scene, experiment.path, columns.back().records, {}, progress));
+    }
     ASPERITY_CHECK(write_compare_report(folder / "report.html", report));
     document["files"]["report"] = (folder / "report.html").string();
   }
@@ -333,7 +336,9 @@ void add_compare(Arguments& program, Console& console, Action& action) {
                "Follow the stroke as the scene says; without it an open stroke goes there and back, so that "
                "energy a loop can be told");
   command.option("--out", options->out, "Folder of the outputs; default out/SCENE-compare");
-  command.flag("--no-report", options->no_report, "Numbers only: no picture, no page");
+  const Argument no_report = command.flag("--no-report", options->no_report, "Numbers only: no picture, no page");
+  command.flag("--no-picture", options->no_picture, "The page with all its plots, and no picture drawn")
+      .excludes(no_report);
   add_console_options(command, console);
   command.closing_words(
       words_of_laws() +

@@ -22,6 +22,7 @@ struct TouchOptions {
   SceneArgument scene;
   std::string out;
   bool no_report = false;
+  bool no_picture = false;
   bool csv = false;
 };
 
@@ -164,7 +165,8 @@ Result<int> touch(const TouchOptions& options, const Console& console) {
     return std::move(run).error();
   }
   ASPERITY_CHECK(trace.finish());
-  ASPERITY_TRY(const RunReport report, build_report(experiment, *run, console, progress, !options.no_report));
+  ASPERITY_TRY(const RunReport report,
+               build_report(experiment, *run, console, progress, !options.no_report && !options.no_picture));
   Json files{{"trace", trace_path}, {"numbers", (folder / "run.json").string()}};
   ASPERITY_CHECK(write_outputs(experiment, *run, report, options, metadata, folder, files));
   for (const std::string& note : experiment.notes) console.note(note);
@@ -193,7 +195,10 @@ void add_touch(Arguments& program, Console& console, Action& action) {
               "Of every surface: see below, or asperity schema law for what each can be told")
       .group("Touch");
   command.option("--out", options->out, "Folder of the outputs; default out/SCENE");
-  command.flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
+  const Argument no_report =
+      command.flag("--no-report", options->no_report, "Trace and numbers only: no picture, no page");
+  command.flag("--no-picture", options->no_picture, "The page with all its plots, and no picture drawn")
+      .excludes(no_report);
   command.flag("--csv", options->csv, "The trace as a table as well (trace.csv, trace.json)");
   add_console_options(command, console);
   command.closing_words(

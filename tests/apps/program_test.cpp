@@ -235,6 +235,35 @@ TEST_F(Program, CompareSetsLawsSideBySide) {
     EXPECT_TRUE(has(table.out, part)) << part;
 }
 
+/// Without a picture the page is whole, and says nothing of one.
+TEST_F(Program, APageWithoutAPicture) {
+  ASSERT_EQ(run("touch quick.json --out with").code, 0);
+  EXPECT_TRUE(has(read("with/report.html"), "<div id=\"picture-store\" hidden><img id=\"picture-image\""));
+  EXPECT_TRUE(fs::exists(folder_ / "with/picture.png"));
+
+  const Call call = run("touch quick.json --no-picture --json --out without");
+  ASSERT_EQ(call.code, 0) << call.err;
+  const json files = json::parse(call.out)["files"];
+  EXPECT_FALSE(files.contains("picture"));
+  for (const char* file : {"trace", "numbers", "report"})
+    EXPECT_TRUE(fs::exists(folder_ / files[file].get<std::string>())) << file;
+  EXPECT_FALSE(fs::exists(folder_ / "without/picture.png"));
+  const std::string page = read("without/report.html");
+  EXPECT_FALSE(has(page, "<img"));
+  EXPECT_TRUE(has(page, "<div id=\"picture-store\" hidden></div>"));
+  // All the numbers that plots are made of are there.
+  for (const char* plot : {"\"force_distance\":", "\"height_distance\":", "\"direction_distance\":", "\"force_time\":"})
+    EXPECT_TRUE(has(page, plot)) << plot;
+
+  const Call laws = run("compare quick.json --laws proxy,mesostructure --no-picture --json --out laws");
+  ASSERT_EQ(laws.code, 0) << laws.err;
+  EXPECT_TRUE(json::parse(laws.out)["files"].contains("report"));
+  EXPECT_TRUE(has(read("laws/report.html"), "\"force_distance\":"));
+  EXPECT_FALSE(has(read("laws/report.html"), "<img"));
+  refused("touch quick.json --no-picture --no-report", {"--no-picture", "--no-report"});
+  refused("compare quick.json --no-report --no-picture", {"--no-picture", "--no-report"});
+}
+
 /// Row M-3: who notices the isosurface is asked of the scene that is compared, its volume and its laws.
 TEST_F(Program, CompareDetectsOnTheSceneItself) {
   const auto detection = [&](double gradient, double band) {
