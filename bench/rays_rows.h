@@ -14,7 +14,7 @@ namespace asperity::bench {
 
 /// How fast one of the two answers the rays of a picture.
 struct RaySpeed {
-  double rays_a_second = 0.0;  ///< of the median of several pictures, one thread
+  double rays_a_second = 0.0;  ///< of the median of several pictures, by the thread's own time
   double hit_share = 0.0;      ///< of all rays
   double worst = 0.0;          ///< ns: the slowest ray, each taken at its least over the pictures
 };
