@@ -29,4 +29,14 @@ inline bool no_farther(const Vec3& to, const Vec3& from, const Vec3& probe) noex
   return (to - probe).squaredNorm() <= (from - probe).squaredNorm() * (1.0 + rounding);
 }
 
+/// Where the proxy of a point came to rest.
+struct PointRest {
+  bool simple = true;  ///< false: more than one plane may hold it, and nothing else here is known
+  bool contact = false;
+  bool converged = true;
+  bool pulls = false;          ///< the probe is outside, and a sticky surface holds on to it
+  Vec3 proxy = Vec3::Zero();   ///< m
+  Vec3 normal = Vec3::Zero();  ///< unit, on the side touched
+};
+
 }  // namespace asperity

@@ -18,6 +18,10 @@ struct ConstraintPlane {
   std::uint32_t owner = 0;     ///< which constraint of the solve it belongs to
   Foot contact;                ///< object frame
 };
+/// Through a place, of no owner. [servo]
+inline ConstraintPlane plane_through(const Vec3& point, const Vec3& normal) noexcept {
+  return {normal, normal.dot(point), 0.0, 0, {}};
+}
 using PlaneSet = FixedVector<ConstraintPlane, 24>;
 /// Whether one of the same surface with the same direction is there already. [servo]
 inline bool stands_among(const ConstraintPlane& plane, const PlaneSet& planes) noexcept {

@@ -7,16 +7,6 @@
 
 namespace asperity {
 
-/// Where the proxy of a point came to rest.
-struct PointRest {
-  bool simple = true;  ///< false: more than one plane may hold it, and nothing else here is known
-  bool contact = false;
-  bool converged = true;
-  bool pulls = false;          ///< the probe is outside, and a sticky surface holds on to it
-  Vec3 proxy = Vec3::Zero();   ///< m
-  Vec3 normal = Vec3::Zero();  ///< unit, on the side touched
-};
-
 /// One tick on one surface, object frame: from the place that the state rests on, or from free space, towards the
 /// probe; along the surface, off it and on to where it is met again. [servo]
 template <SurfaceView View>
@@ -157,8 +147,8 @@ class PointProxy {
     recall_flanks();
     for (int move = 0; move < most_moves && moves_ < most_moves_of_tick; ++move, ++moves_) {
       PlaneSet planes;
-      planes.push_back(plane_of(spot_, normal()));
-      for (const Flank& flank : flanks_) planes.push_back(plane_of(flank.spot, flank.normal()));
+      planes.push_back(plane_through(spot_.point, normal()));
+      for (const Flank& flank : flanks_) planes.push_back(plane_through(flank.spot.point, flank.normal()));
       const PlaneProjection held = project_onto_planes(probe_, planes, false);
       if (held.active.size() < 2) {
         if (!held.active.empty() && held.active[0].plane > 0 && !lead_with(held.active[0].plane - 1))
@@ -179,10 +169,6 @@ class PointProxy {
       for (Flank& flank : flanks_) view_.descend(flank.place, flank.spot, {.point = spot_.point, .may_leave = false});
     }
     return DescentEnd::limited;
-  }
-
-  static ConstraintPlane plane_of(const Spot& spot, const Vec3& normal) noexcept {
-    return {normal, normal.dot(spot.point), 0.0, 0, {}};
   }
 
   /// What the last tick left it beside.
@@ -236,10 +222,10 @@ class PointProxy {
     const Spot spot = spot_;
     const Vec3 target = spot.point + step;
     DescentEnd end = DescentEnd::rest;
-    const Way way = go(
-        end,
-        [&](int moves) { return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves}); },
-        short_walk);
+    const auto lead = [&](int moves) {
+      return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves});
+    };
+    const Way way = go(end, lead, short_walk);
     if (way == Way::on || (way == Way::free && nearer(spot))) return way;
     place_ = place;
     spot_ = spot;
