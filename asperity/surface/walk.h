@@ -46,7 +46,7 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
 
 /// Newton's step with each curvature of the squared distance counted as positive: along a ravine, where it is not
 /// convex, and not to and fro across. [servo]
-inline WalkStep ravine_step(const WalkForms& f) noexcept {
+[[gnu::noinline]] inline WalkStep ravine_step(const WalkForms& f) noexcept {
   constexpr double least_curvature = 0.05;
   if (!(f.uu > 0.0)) return {};
   // In axes in which the metric is 1.
@@ -112,17 +112,8 @@ class Walk {
   Walk(Chart& chart, const Goal& goal, double side) noexcept : chart_(chart), asked_(goal), side_(side) {}
 
   DescentEnd run() noexcept {
-    int next_look = look_after;
-    double distance = infinity;
     while (moves_ < asked_.moves) {
       if (asked_.may_leave && leaves()) return DescentEnd::left;
-      // Far behind a surface that is bent much there is no end to small moves that change no force.
-      if (!asked_.exactly && moves_ >= next_look) {
-        const double now = (chart_.spot().point - asked_.point).norm();
-        if (now >= distance * (1.0 - least_gain)) return DescentEnd::rest;
-        distance = now;
-        next_look = moves_ + look_after;
-      }
       aim();
       if (settled()) return DescentEnd::rest;
       forms_ = chart_.forms(goal_);
@@ -137,11 +128,20 @@ class Walk {
         if (asked_.may_leave && leaves()) return DescentEnd::left;
       }
       if (!advance(step) && !along_fold()) return DescentEnd::rest;
+      if (moves_ >= next_look_ && creeps()) return DescentEnd::rest;
     }
     return DescentEnd::limited;
   }
 
  private:
+  /// Far behind a surface that is bent much there is no end to small moves that change no force.
+  [[gnu::noinline]] bool creeps() noexcept {
+    const double now = (chart_.spot().point - asked_.point).norm();
+    const bool creeping = !asked_.exactly && now >= looked_at_ * (1.0 - least_gain);
+    looked_at_ = now;
+    next_look_ = moves_ + look_after;
+    return creeping;
+  }
   using Spot = typename Chart::Spot;
 
   [[nodiscard]] bool leaves() const noexcept {
@@ -263,6 +263,8 @@ class Walk {
   Vec3 goal_ = Vec3::Zero();
   WalkForms forms_;               ///< of the last place
   bool formed_ = false;           ///< they are known, and of this chart
+  int next_look_ = look_after;    ///< at how much the last moves have gained
+  double looked_at_ = infinity;   ///< distance from the goal then
   bool shortened_ = false;        ///< a step was no nearer as a whole
   Vec3 own_ = Vec3::Zero();       ///< front at the start of a step
   Vec3 rejected_ = Vec3::Zero();  ///< of a place that was no nearer

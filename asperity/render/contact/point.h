@@ -17,7 +17,7 @@ class PointProxy {
   PointProxy(const View& view, Sides sides, const Friction& friction, const Vec3& probe, OfSurface& state) noexcept
       : view_(view), sides_(sides), friction_(friction), probe_(probe), state_(state) {}
 
-  PointRest run(const Vec3& from) noexcept {
+  [[gnu::always_inline]] inline PointRest run(const Vec3& from) noexcept {
     // One tick may leave the surface and meet it again this often: over a field of needles.
     constexpr int most_flights = 64;
     // Nor does it get away from where two folds all but touch by flying to and fro between them.
@@ -73,6 +73,7 @@ class PointProxy {
   static constexpr int most_moves_of_tick = 48;
   /// Evaluations of one way along a crease.
   static constexpr int short_walk = 72;
+  static constexpr bool may_overlap = requires(const View& v) { v.overlaps(); };
   static constexpr bool on_triangles = requires(const View& v, const Place& p) { v.within_face(p); };
 
   [[nodiscard]] Vec3 normal() const noexcept { return place_.side() * spot_.front; }
@@ -80,7 +81,7 @@ class PointProxy {
   /// Straight to the probe through free space. False when nothing is in the way.
   bool fly(const Vec3& from) noexcept {
     state_.rests = state_.sliding = false;
-    flanks_.clear();
+    if constexpr (may_overlap) flanks_.clear();
     const SweptHit hit = view_.first_touch({from, probe_}, sides_);
     if (!hit.hit || hit.contact.normal.isZero()) return false;
     take(hit);
@@ -90,8 +91,7 @@ class PointProxy {
 
   /// Whether another fold lies between where it is and where it would fly from.
   [[nodiscard]] bool pinched(const Vec3& start) const noexcept {
-    if constexpr (requires { view_.overlaps(); })
-      return view_.overlaps() && view_.first_touch({spot_.point, start}, sides_).hit;
+    if constexpr (may_overlap) return view_.overlaps() && view_.first_touch({spot_.point, start}, sides_).hit;
     return false;
   }
 
@@ -117,16 +117,17 @@ class PointProxy {
     state_.places.clear();
     state_.places.push_back(place_);
     state_.normal = normal();
-    // In a crease it is pushed along what draws it.
-    const Vec3 spring = spot_.point - probe_;
-    if (!flanks_.empty() && !spring.isZero()) state_.normal = spring.normalized();
-    for (const Flank& flank : flanks_) state_.places.push_back(flank.place);
+    if constexpr (may_overlap) {
+      // In a crease it is pushed along what draws it.
+      if (!flanks_.empty() && spot_.point != probe_) state_.normal = (spot_.point - probe_).normalized();
+      for (const Flank& flank : flanks_) state_.places.push_back(flank.place);
+    }
     return {true, true, converged, false, spot_.point, state_.normal};
   }
 
   /// Sticks, or slides as far as friction and what lies in the way let it.
   DescentEnd settle() noexcept {
-    if constexpr (requires { view_.overlaps(); }) {
+    if constexpr (may_overlap) {
       if (view_.overlaps()) return settle_over_folds();
     }
     return settle_on_fold();
@@ -261,7 +262,7 @@ class PointProxy {
     return Way::on;
   }
 
-  DescentEnd settle_on_fold(int moves = most_walk) noexcept {
+  [[gnu::always_inline]] inline DescentEnd settle_on_fold(int moves = most_walk) noexcept {
     if (friction_.still <= 0.0) return slide(0.0, moves);
     const Vec3 normal_before = normal();
     if ((probe_ - spot_.point).dot(normal_before) > 0.0) return DescentEnd::left;
