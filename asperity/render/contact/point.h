@@ -20,9 +20,6 @@ class PointProxy {
   [[gnu::always_inline]] inline PointRest run(const Vec3& from) noexcept {
     // One tick may leave the surface and meet it again this often: over a field of needles.
     constexpr int most_flights = 64;
-    // Nor does it get away from where two folds all but touch by flying to and fro between them.
-    constexpr int most_in_vain = 3;
-    int in_vain = 0;
     if (state_.rests) {
       place_ = state_.places[0];
       spot_ = view_.at(place_, place_.side() * state_.normal);
@@ -51,13 +48,8 @@ class PointProxy {
       // Where there is no place to fly from it stays.
       if (!view_.launch(place_, spot_, start)) return resting(true);
       if (pinched(start)) start = spot_.point;
-      const Vec3 left = spot_.point;
+      if (flies_in_vain()) break;
       if (!fly(start)) return free();
-      if ((spot_.point - left).norm() > 4.0 * view_.skin()) {
-        in_vain = 0;
-      } else if (++in_vain == most_in_vain) {
-        break;
-      }
     }
     return resting(false);
   }
@@ -87,6 +79,19 @@ class PointProxy {
     take(hit);
     state_.rests = true;
     return true;
+  }
+
+  /// Whether it does not get away from where folds all but touch by flying to and fro between them.
+  [[nodiscard]] bool flies_in_vain() noexcept {
+    constexpr int most_in_vain = 3;
+    constexpr double least_share = 1e-3;
+    if constexpr (may_overlap) {
+      if (!view_.overlaps()) return false;
+      const double distance = (spot_.point - probe_).norm();
+      in_vain_ = distance > (1.0 - least_share) * left_at_ ? in_vain_ + 1 : 0;
+      left_at_ = distance;
+    }
+    return in_vain_ == most_in_vain;
   }
 
   /// Whether another fold lies between where it is and where it would fly from.
@@ -221,10 +226,9 @@ class PointProxy {
   Way go_along(const Vec3& step) noexcept {
     const Place place = place_;
     const Spot spot = spot_;
-    const Vec3 target = spot.point + step;
     DescentEnd end = DescentEnd::rest;
     const auto lead = [&](int moves) {
-      return view_.descend(place_, spot_, {.point = target, .may_leave = false, .moves = moves});
+      return view_.descend(place_, spot_, {.point = spot.point + step, .may_leave = false, .moves = moves});
     };
     const Way way = go(end, lead, short_walk);
     if (way == Way::on || (way == Way::free && nearer(spot))) return way;
@@ -288,7 +292,9 @@ class PointProxy {
   Place place_;
   Spot spot_;
   FixedVector<Flank, 2> flanks_;
-  int moves_ = 0;  ///< between overlapping folds
+  int moves_ = 0;              ///< between overlapping folds
+  int in_vain_ = 0;            ///< flights that came hardly nearer
+  double left_at_ = infinity;  ///< distance from the probe where it flew off last
 };
 
 }  // namespace asperity
