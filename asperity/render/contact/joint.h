@@ -82,8 +82,7 @@ class JointSolve {
   DescentEnd walk(Held& held, const Vec3& goal, bool may_leave, int moves) const noexcept;
   [[nodiscard]] ConstraintPlane plane_at(const Held& held) const noexcept;
   void planes_at(const Vec3& position, PlaneSet& out) noexcept;
-  [[nodiscard]] Met first_met(const Segment& motion, const Held* before, const Held* along) noexcept;
-  [[nodiscard]] Met first_met_between(const Segment& motion, const HeldSet& after) noexcept;
+  [[nodiscard]] Met first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept;
   std::size_t hold_to(const Met& met) noexcept;
   [[nodiscard]] bool onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexcept;
   [[nodiscard]] bool slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "asperity/render/contact/joint.h"
 
@@ -128,41 +129,46 @@ void JointSolve::planes_at(const Vec3& position, PlaneSet& out) noexcept {
   }
 }
 
-/// What a point meets first on its way; of the surface that it goes along (`along`, from where it was there) only what
-/// overlaps it.
-JointSolve::Met JointSolve::first_met(const Segment& motion, const Held* before, const Held* along) noexcept {
+/// What a point meets first on its way; of the surfaces that it goes along (`from`, and where on them it comes to, in
+/// the same order) only what overlaps them.
+JointSolve::Met JointSolve::first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept {
   Met met;
-  const double length = (motion.to - motion.from).norm();
-  if (length == 0.0) return met;
+  if ((motion.to - motion.from).norm() == 0.0) return met;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
+    const Entry& entry = entries_[i];
     const Touched& touch = *entry.touch;
     const Sides sides = touch.facts->sides;
+    Segment local = touch.to_local(motion);
     SweptHit hit;
-    if (!entry.smooth) {
-      hit = std::get_if<TriangleView>(&touch.view)->sweep(touch.to_local(motion), margin(), sides);
-    } else if (along != nullptr && along->owner == i) {
+    bool along = false;
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      if (from[k].owner != i) continue;
+      along = true;
       const auto* relief = std::get_if<ReliefView>(&touch.view);
       if (relief == nullptr || !relief->overlaps()) continue;
-      hit = relief->between(before->place, relief->at(before->place), along->place, relief->at(along->place), sides);
-    } else {
+      const ReliefPoint start = relief->at(from[k].place);
+      const SweptHit fold = relief->between(from[k].place, start, to[k].place, relief->at(to[k].place), sides);
+      if (fold.hit && (!hit.hit || fold.t < hit.t)) hit = fold;
+    }
+    if (!entry.smooth) {
+      hit = std::get_if<TriangleView>(&touch.view)->sweep(local, margin(), sides);
+    } else if (!along) {
       // From a little above what it touches there.
-      Segment local = touch.to_local(motion);
       for (const Held& held : held_) {
         if (held.owner != i) continue;
         const double short_of = 0.5 * entry.skin - held.normal.dot(motion.from - held.point);
         if (short_of > 0.0) local.from += short_of * touch.turned_back(held.normal);
       }
       hit = on_smooth_view(touch.view, [&](const auto& view) { return view.first_touch(local, sides); });
-      if (hit.hit && hit.contact.normal.isZero()) hit.hit = false;
+      hit.hit = hit.hit && !hit.contact.normal.isZero();
     }
-    if (!hit.hit || !(hit.t < met.t || !met.hit)) continue;
-    met = {true, hit.t, i, hit};
+    if (hit.hit && (!met.hit || hit.t < met.t)) met = {true, hit.t, i, hit};
   }
   return met;
 }
 
-/// Holds it to what it has met; of the same place before, only the newer.
+/// Holds it to what it has met; of the same place before, only the newer. Where there is no room, it stays with the
+/// ones that it had, and the number is none of theirs.
 std::size_t JointSolve::hold_to(const Met& met) noexcept {
   const Touched& touch = *entries_[met.owner].touch;
   const Foot& contact = met.what.contact;
@@ -174,9 +180,7 @@ std::size_t JointSolve::hold_to(const Met& met) noexcept {
     held_[i] = held;
     return i;
   }
-  if (held_.size() == held_.capacity()) held_.swap_remove(0);
-  held_.push_back(held);
-  return held_.size() - 1;
+  return held_.push_back(held) ? held_.size() - 1 : held_.size();
 }
 
 /// From near them onto all of the surfaces that `on` names, and as near as it can to where it is: Newton's steps on
@@ -212,32 +216,34 @@ bool JointSolve::onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexce
 bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept {
   stopped = no_owner;
   for (int walked = 0, leg = first_leg; walked < most_walk; walked += leg, leg *= 2) {
-    const Held before = held_[which];
-    Held& held = held_[which];
-    const DescentEnd end = walk(held, goal, true, leg);
-    const Met met = first_met({before.point, held.point}, &before, &held);
+    HeldSet before;
+    before.push_back(held_[which]);
+    const DescentEnd end = walk(held_[which], goal, true, leg);
+    HeldSet after;
+    after.push_back(held_[which]);
+    const Vec3 to = held_[which].point;
+    const Met met = first_met({proxy, to}, before, after);
     if (!met.hit) {
-      proxy = held.point;
+      proxy = to;
       if (end != DescentEnd::limited) return end != DescentEnd::left;
       continue;
     }
     stopped = met.owner;
+    held_[which] = before[0];
     // To where the two meet; or else, from where it was, by planes that hold both.
-    Vec3 crease = before.point + met.t * (held.point - before.point);
-    held = before;
-    proxy = before.point;
-    HeldSet on;
-    on.push_back(before);
+    Vec3 crease = proxy + met.t * (to - proxy);
+    HeldSet on = before;
     PlaneSet walls;
     std::size_t other = held_.size();
     if (entries_[met.owner].smooth) {
       other = hold_to(met);
-      if (other == which) return false;
+      if (other == which || other == held_.size()) return false;
       on.push_back(held_[other]);
+      before.push_back(held_[other]);
     } else {
       walls.push_back(plane_of(met.owner, met.what.contact));
     }
-    if (!onto(on, walls, crease)) return false;
+    if (!onto(on, walls, crease) || first_met({proxy, crease}, before, on).hit) return false;
     held_[which] = on[0];
     if (on.size() > 1) held_[other] = on[1];
     proxy = crease;
@@ -259,7 +265,7 @@ Vec3 JointSolve::lifted(const Vec3& position) const noexcept {
 bool JointSolve::fly(const Vec3& goal, Vec3& proxy) noexcept {
   const Vec3 start = lifted(proxy);
   held_.clear();
-  const Met met = first_met({start, goal}, nullptr, nullptr);
+  const Met met = first_met({start, goal}, {}, {});
   if (!met.hit) {
     proxy = goal;
     return true;
@@ -293,8 +299,9 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
   };
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     HeldSet after = held_;
-    HeldSet on;
-    for (const std::size_t which : holding) on.push_back(held_[which]);
+    HeldSet from;
+    for (const std::size_t which : holding) from.push_back(held_[which]);
+    HeldSet on = from;
     Vec3 next = proxy + step;
     bool good = onto(on, walls, next) && nearer(next, proxy, goal);
     for (std::size_t i = 0; good && i < held_.size(); ++i) {
@@ -304,16 +311,13 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     }
     for (std::size_t k = 0; k < holding.size(); ++k) after[holding[k]] = on[k];
     if (good) {
-      const Met met = first_met_between({proxy, next}, after);
+      const Met met = first_met({proxy, next}, from, on);
       if (!met.hit) {
         held_ = after;
         proxy = next;
         return Move::nearer;
       }
-      if (entries_[met.owner].smooth) {
-        hold_to(met);
-        return Move::learned;
-      }
+      if (entries_[met.owner].smooth) return hold_to(met) < held_.size() ? Move::learned : Move::none;
       const ConstraintPlane wall = plane_of(met.owner, met.what.contact);
       if (!stands_among(wall, planes)) {
         remember(wall);
@@ -327,36 +331,6 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     if (step.norm() <= tolerance_) break;
   }
   return Move::none;
-}
-
-/// What is in the way from one place between surfaces to another: nothing that holds it there.
-JointSolve::Met JointSolve::first_met_between(const Segment& motion, const HeldSet& after) noexcept {
-  Met met;
-  for (std::size_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
-    const Touched& touch = *entry.touch;
-    SweptHit hit;
-    if (!entry.smooth) {
-      hit = std::get_if<TriangleView>(&touch.view)->sweep(touch.to_local(motion), margin(), touch.facts->sides);
-    } else {
-      bool held = false;
-      for (std::size_t k = 0; k < held_.size(); ++k) {
-        if (held_[k].owner != i) continue;
-        held = true;
-        const auto* relief = std::get_if<ReliefView>(&touch.view);
-        if (relief == nullptr || !relief->overlaps()) continue;
-        const SweptHit fold = relief->between(held_[k].place, relief->at(held_[k].place), after[k].place,
-                                              relief->at(after[k].place), touch.facts->sides);
-        if (fold.hit && (!hit.hit || fold.t < hit.t)) hit = fold;
-      }
-      if (!held)
-        hit = on_smooth_view(
-            touch.view, [&](const auto& view) { return view.first_touch(touch.to_local(motion), touch.facts->sides); });
-      if (hit.hit && hit.contact.normal.isZero()) hit.hit = false;
-    }
-    if (hit.hit && (!met.hit || hit.t < met.t)) met = {true, hit.t, i, hit};
-  }
-  return met;
 }
 
 /// Knows of what it touches where it is now, and forgets the rest.
@@ -395,7 +369,9 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
   if (!attached_) attach(solution.proxy);
   Vec3& proxy = solution.proxy;
   PlaneSet& planes = solution.planes;
-  if (held_.size() == 1) proxy = held_[0].point;
+  // What stands around one place is known after a few looks: planes that are met again and again hold nothing more.
+  constexpr int most_learned = 6;
+  int learned = 0;
   int idle = 0;
   std::size_t stopped = no_owner;
   for (int move = 0; move < most_moves && !solution.converged; ++move) {
@@ -419,15 +395,15 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
       const bool crease = projection.active.size() > 1 || lead == held_.size() ||
                           (stopped != no_owner && along_crease(lead, stopped, goal, planes, projection));
       const Move way = crease ? step_between(planes, projection, goal, proxy) : Move::none;
-      if (way == Move::learned) continue;
-      if (way == Move::none && lead < held_.size()) {
+      if (way == Move::learned && ++learned <= most_learned) continue;
+      if (way != Move::nearer && lead < held_.size()) {
         solution.converged = slide(lead, goal, proxy, stopped);
         if ((proxy - before).norm() > short_slide * step.norm()) stopped = no_owner;
       }
     }
     release(proxy);
     if (nearer(proxy, before, goal)) {
-      idle = 0;
+      idle = learned = 0;
       feet_.clear();
     } else if (++idle == most_idle) {
       // No motion comes nearer: a local minimum, found by trying.
@@ -442,14 +418,19 @@ void JointSolve::remember_held(std::size_t index, const ConstraintSolution& solu
   OfSurface& state = touch.contact->surface;
   state.places.clear();
   double strongest = 0.0;
+  const ConstraintPlane* leads = nullptr;
   for (const PlaneProjection::Active& active : solution.projection.active) {
     const ConstraintPlane& plane = solution.planes[active.plane];
     if (plane.owner != index || !(active.multiplier > strongest)) continue;
     strongest = active.multiplier;
-    state.normal = touch.turned_back(plane.normal);
+    leads = &plane;
   }
+  if (leads != nullptr) state.normal = touch.turned_back(leads->normal);
   for (const Held& held : held_) {
-    if (held.owner == index) state.places.push_back(held.place);
+    if (held.owner != index || !state.places.push_back(held.place)) continue;
+    const bool first =
+        leads != nullptr && leads->contact.element == held.place.element && leads->contact.at == held.place.at;
+    if (first) std::swap(state.places[0], state.places[state.places.size() - 1]);
   }
 }
 
@@ -459,7 +440,7 @@ void JointSolve::explain(const Vec3& goal, ConstraintSolution& solution) noexcep
   solution.projection = project_onto_planes(goal, solution.planes, false);
   const Vec3 spring = proxy - goal;
   const double length = spring.norm();
-  if ((solution.projection.point - proxy).norm() <= tolerance_ + margin() + widest_skin_) return;
+  if (length == 0.0 || (solution.projection.point - proxy).norm() <= tolerance_ + margin() + widest_skin_) return;
   if (solution.projection.active.size() <= 1 && !solution.planes.empty()) {
     // At the bottom of a valley, at a rim: held along the spring.
     const std::size_t which = solution.projection.active.empty() ? 0 : solution.projection.active[0].plane;
