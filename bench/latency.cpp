@@ -34,7 +34,7 @@ struct Options {
   std::size_t updates = 100000;
   std::size_t cold_updates = 200;
   std::size_t counted = 0;  ///< ticks a row for a tool that counts; 0: timed
-  RealEffort real{"../shared/data", 20000, {}, false};
+  RealEffort real{"../shared/data", 20000, {}, {}, false};
 };
 
 void say(const std::string& what) {
@@ -214,6 +214,9 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--rows", options.real.only,
                    "real: rows whose \"body, stroke, law\" holds this text; rays: whose body does");
+    app.add_flag_callback(
+        "--long", [&] { options.real.ticks = 1000000; }, "real: a million ticks a row");
+    app.add_option("--budget", options.real.budget, "real: of a tick, in evaluations; 0: no limit");
     app.add_flag("--every", options.real.every, "real: every pair of strokes and laws");
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))

@@ -232,6 +232,8 @@ void run(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, R
   double worst = -1.0;
   Samples samples;
   samples.reserve(path.size());
+  std::vector<std::uint32_t> work;
+  work.reserve(path.size());
   Vec3 last_force = Vec3::Zero();
   std::size_t touched = 0;
   ProbeSample probe;
@@ -246,6 +248,9 @@ void run(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, R
     const bool contact = felt.flags.has(TickFlag::contact);
     samples.add(time, contact);
     touched += contact ? 1U : 0U;
+    work.push_back(cache.work().done().sum());
+    row.open += felt.flags.has(TickFlag::work_left) ? 1U : 0U;
+    row.longest_open = std::max(row.longest_open, state.open_ticks);
     row.not_converged += felt.flags.has(TickFlag::not_converged) ? 1U : 0U;
     row.limited += felt.flags.has(TickFlag::energy_limited) ? 1U : 0U;
     if (tick > 0) row.largest_jump = std::max(row.largest_jump, (felt.wrench.force - last_force).norm());
@@ -257,6 +262,9 @@ void run(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, R
     worst_probe = probe;
   }
   row.times = samples.summary(clock_cost);
+  std::sort(work.begin(), work.end());
+  row.work_p999 = work[std::min(work.size() - 1, work.size() * 999 / 1000)];
+  row.work_max = work.back();
   row.contact_share = static_cast<double>(touched) / static_cast<double>(path.size());
   // What the machine did meanwhile meets each of these alike, and the least of them hardly at all.
   row.worst_again = infinity;
@@ -318,7 +326,10 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
     std::string last_law;
     std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     for (const auto& [stroke, law] : pairs) {
-      RealRow row{body.name, stroke, law, {}, 0.0, 0.0, 0, 0, 0.0};
+      RealRow row;
+      row.body = body.name;
+      row.stroke = stroke;
+      row.law = law;
       if (!effort.only.empty() &&
           fmt::format("{}, {}, {}", body.name, stroke, law).find(effort.only) == std::string::npos)
         continue;
@@ -335,7 +346,9 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
         instances.push_back(std::move(wall));
         led_as = "raster";
       }
-      ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), 0.0));
+      SceneSettings settings;
+      settings.budget = effort.budget;
+      ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), settings));
       run(scene, led(led_as, carrier, body.highest, effort.ticks, 17, instances.size() > 1), clock_cost, row);
       told(fmt::format("{}, {}, {}: p99.9 {:.1f} us, worst {:.1f} us again {:.1f}", body.name, stroke, law,
                        1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
@@ -351,6 +364,8 @@ namespace {
 std::string sum_up(const std::string& of, const std::vector<RealRow>& rows) {
   std::size_t count = 0;
   std::size_t not_converged = 0;
+  std::size_t open = 0;
+  std::uint32_t longest = 0;
   std::size_t in_time = 0;
   std::size_t in_time_at_worst = 0;
   double slowest = 0.0;
@@ -360,33 +375,41 @@ std::string sum_up(const std::string& of, const std::vector<RealRow>& rows) {
     const bool fast = row.stroke == "sweep 5 m/s";
     ++count;
     not_converged += row.not_converged;
+    open += row.open;
+    longest = std::max(longest, row.longest_open);
     in_time += row.times.p999 <= (fast ? 50e3 : 20e3) ? 1U : 0U;
     in_time_at_worst += row.worst_again <= (fast ? 200e3 : 100e3) ? 1U : 0U;
     slowest = std::max(slowest, row.times.p999);
     slowest_of_all = std::max(slowest_of_all, row.worst_again);
   }
   if (count == 0) return {};
-  return fmt::format("{:<16} {:>5} {:>12} {:>14.1f} {:>13} {:>14.1f} {:>8}\n", of.empty() ? "all" : of, count, in_time,
-                     1e-3 * slowest, in_time_at_worst, 1e-3 * slowest_of_all, not_converged);
+  return fmt::format("{:<16} {:>5} {:>12} {:>14.1f} {:>13} {:>14.1f} {:>8} {:>8} {:>8}\n", of.empty() ? "all" : of,
+                     count, in_time, 1e-3 * slowest, in_time_at_worst, 1e-3 * slowest_of_all, not_converged, open,
+                     longest);
 }
 
 }  // namespace
 
 std::string real_text(const std::vector<RealRow>& rows) {
-  std::string text =
-      fmt::format("{:<32} {:<16} {:<24} {:>7} {:>8} {:>9} {:>9} {:>9} {:>5} {:>6} {:>6} {:>6}\n", "body", "stroke",
-                  "law", "p50 us", "p99", "p99.9", "max", "worst*", "in %", "not c.", "e.lim.", "jump N");
+  std::string text = fmt::format(
+      "{:<32} {:<16} {:<24} {:>7} {:>8} {:>9} {:>9} {:>9} {:>6} {:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6}\n", "body",
+      "stroke", "law", "p50 us", "p99", "p99.9", "max", "worst*", "w99.9", "w max", "in %", "not c.", "open", "run",
+      "e.lim.", "jump N");
   for (const RealRow& row : rows) {
     text += fmt::format(
-        "{:<32} {:<16} {:<24} {:>7.2f} {:>8.2f} {:>9.2f} {:>9.1f} {:>9.1f} {:>5.0f} {:>6} {:>6} {:>6.2f}\n", row.body,
-        row.stroke, row.law, 1e-3 * row.times.p50, 1e-3 * row.times.p99, 1e-3 * row.times.p999, 1e-3 * row.times.max,
-        1e-3 * row.worst_again, 100.0 * row.contact_share, row.not_converged, row.limited, row.largest_jump);
+        "{:<32} {:<16} {:<24} {:>7.2f} {:>8.2f} {:>9.2f} {:>9.1f} {:>9.1f} {:>6} {:>6} {:>5.0f} {:>6} {:>6} {:>5} "
+        "{:>6} {:>6.2f}\n",
+        row.body, row.stroke, row.law, 1e-3 * row.times.p50, 1e-3 * row.times.p99, 1e-3 * row.times.p999,
+        1e-3 * row.times.max, 1e-3 * row.worst_again, row.work_p999, row.work_max, 100.0 * row.contact_share,
+        row.not_converged, row.open, row.longest_open, row.limited, row.largest_jump);
   }
   text +=
-      "* the slowest tick again from its state, caches empty and 64 MB swept before: the least of 20 times.\n\n"
+      "* the slowest tick again from its state, caches empty and 64 MB swept before: the least of 20 times. w: work, "
+      "in evaluations. open: "
+      "ticks whose budget was spent, run: one after the other.\n\n"
       "Rows in time: p99.9 at most 20 us, the slowest tick 100 us; at 5 m/s 50 and 200 us.\n";
-  text += fmt::format("{:<16} {:>5} {:>12} {:>14} {:>13} {:>14} {:>8}\n", "body", "rows", "p99.9 kept", "dearest p99.9",
-                      "slowest kept", "dearest tick", "not c.");
+  text += fmt::format("{:<16} {:>5} {:>12} {:>14} {:>13} {:>14} {:>8} {:>8} {:>8}\n", "body", "rows", "p99.9 kept",
+                      "dearest p99.9", "slowest kept", "dearest tick", "not c.", "open", "run");
   for (const char* body : {"bunny-28k", "spot", "FlightHelmet", "vase", "carotid", "cavity", "bunny, potential", ""})
     text += sum_up(body, rows);
   return text;

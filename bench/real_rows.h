@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,17 +23,22 @@ struct RealRow {
   Latency times;                  ///< ns
   double worst_again = 0.0;       ///< ns: the slowest tick from its state, caches empty and cold, the least of 20 times
   double contact_share = 0.0;     ///< of the ticks
+  std::uint32_t work_p999 = 0;    ///< evaluations, bounds and frames (WorkCount::sum)
+  std::uint32_t work_max = 0;     ///< the same of the dearest tick
   std::size_t not_converged = 0;  ///< ticks
-  std::size_t limited = 0;        ///< ticks whose energy was limited
-  double largest_jump = 0.0;      ///< N, between two ticks
+  std::size_t open = 0;           ///< ticks whose budget was spent before the proxy was at rest
+  std::uint32_t longest_open = 0;  ///< of those, one after the other
+  std::size_t limited = 0;         ///< ticks whose energy was limited
+  double largest_jump = 0.0;       ///< N, between two ticks
 };
 
 /// How many ticks, and of what.
 struct RealEffort {
-  std::filesystem::path data;  ///< meshes/, textures/, volumes/
-  std::size_t ticks = 20000;   ///< a row
-  std::string only;            ///< rows whose "body, stroke, law" holds this text; empty: all
-  bool every = false;          ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them
+  std::filesystem::path data;           ///< meshes/, textures/, volumes/
+  std::size_t ticks = 20000;            ///< a row
+  std::string only;                     ///< rows whose "body, stroke, law" holds this text; empty: all
+  std::optional<std::uint32_t> budget;  ///< of each tick; 0: no limit
+  bool every = false;  ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them
 };
 
 /// Bodies of real data, each with strokes and laws that go together, in an order that is always the same; `told` hears

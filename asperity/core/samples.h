@@ -38,6 +38,7 @@ enum class TickFlag : std::uint32_t {
   coarse_data = 1u << 9,     ///< part of a volume was not in memory yet and was felt from a coarser level
   field_force = 1u << 10,    ///< a volume without a surface pushes
   texture_faded = 1u << 11,  ///< a texture is finer than speed or device can render, and was felt weaker
+  work_left = 1u << 12,      ///< the tick's budget was spent; the proxy goes on from where it is in the next tick
 };
 /// As in reports.
 template <>
@@ -53,7 +54,8 @@ struct Names<TickFlag> {
                                                                 {TickFlag::energy_limited, "energy_limited"},
                                                                 {TickFlag::coarse_data, "coarse_data"},
                                                                 {TickFlag::field_force, "field_force"},
-                                                                {TickFlag::texture_faded, "texture_faded"}});
+                                                                {TickFlag::texture_faded, "texture_faded"},
+                                                                {TickFlag::work_left, "work_left"}});
 };
 
 /// A set of TickFlag.
@@ -76,6 +78,11 @@ class Flags {
  private:
   std::uint32_t bits_ = 0;
 };
+
+/// Whether the proxy was not at rest yet: it ran out of moves, or of the tick's budget. [any]
+constexpr bool unfinished(const Flags& flags) noexcept {
+  return flags.has(TickFlag::not_converged) || flags.has(TickFlag::work_left);
+}
 
 /// What is touched, in brief. Fields that a law does not know are left at their defaults.
 struct ContactSummary {

@@ -214,6 +214,8 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   settings.tip_radius = probe.value.tip;
   ASPERITY_TRY(settings.view, read_view(root, bounds));
   ASPERITY_CHECK(read_change(root, settings));
+  settings.budget = static_cast<std::uint32_t>(
+      root.get("budget", static_cast<int>(SceneSettings::budget_for(settings.probe_radius))));
   note_detail(instances, settings, context);
   ASPERITY_TRY(ScenePart<StrokeSettings> stroke,
                read_stroke(root.raw("stroke"), "stroke", in_workspace(settings.view, bounds), context));

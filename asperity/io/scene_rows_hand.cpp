@@ -30,6 +30,10 @@ void scene(SceneObject& row) {
   row("view", Type::object("view"), "How the scene is seen, and how the workspace of the device lies in it.",
       or_else("as it is, and nobody looks"));
   row("change", Type::object("change"), "How changes of surfaces are felt.");
+  row("budget", Type::integer(0, 1000000),
+      "What a force update may look at, in evaluations of a surface, about 0.1 us each; 0: no limit. What does not fit "
+      "is gone on with in the next updates.",
+      or_else("600 for a point, 0 for a ball"), by_contents("less than 100 but 0"));
 }
 
 void probe(SceneObject& row) {

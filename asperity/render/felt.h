@@ -95,16 +95,16 @@ inline FeltView felt_view(const Touched& touch) noexcept {
   return std::visit(
       [&]<class Provider>(const std::shared_ptr<const Provider>& surface) -> FeltView {
         if constexpr (std::is_same_v<Provider, ImplicitSurface>) {
-          return surface->iso().view(cache.cells, felt.level, felt.threshold);
+          return surface->iso().view(cache, felt.level, felt.threshold);
         } else if constexpr (std::is_same_v<Provider, IsoSurface>) {
-          return surface->view(cache.cells, felt.level, felt.threshold);
+          return surface->view(cache, felt.level, felt.threshold);
         } else if constexpr (std::is_same_v<Provider, MeshSurface> || std::is_same_v<Provider, ReliefSurface>) {
           if constexpr (std::is_same_v<Provider, ReliefSurface>) {
             if (touch.facts->smooth || !touch.facts->constrains) return surface->view(cache, touch.moment);
           }
           return constraint_mesh(*touch.instance)->view(cache);
         } else {
-          return surface->view();
+          return surface->view(cache.work);
         }
       },
       touch.instance->surface);

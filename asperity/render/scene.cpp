@@ -216,6 +216,10 @@ Status check(const SceneSettings& settings) {
   if (!length(settings.energy_capacity))
     return bad("energy_capacity", settings.energy_capacity, "an energy of 0 or more (J)");
   if (!(settings.level_rate > 0.0)) return bad("level_rate", settings.level_rate, "levels a second, above 0");
+  const std::uint32_t budget = settings.budget.value_or(0);
+  if (budget > 0 && budget < SceneSettings::least_budget)
+    return bad_value(fmt::format("is {}", budget), "budget",
+                     fmt::format("{} evaluations or more, or 0: no limit", SceneSettings::least_budget));
   return success();
 }
 

@@ -2,6 +2,7 @@
 // The immutable snapshot that the servo thread reads: what is touched, how it is felt, what it is made of.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,12 @@ struct SceneSettings {
   double energy_capacity = EnergyAccount::default_capacity;
   /// How fast coats change their level of detail (levels a second), above 0.
   double level_rate = 8.0;
+  /// What a tick may look at, in evaluations of a surface (WorkCount::sum), at least least_budget; 0: no limit. A proxy
+  /// that is not at rest by then goes on from where it is in the next tick (work_left). Without a value budget_for.
+  std::optional<std::uint32_t> budget = {};
+  static constexpr std::uint32_t least_budget = 100;
+  /// For a point about 60 us; a ball's single searches take more than any such budget: none. [any]
+  static constexpr std::uint32_t budget_for(double probe_radius) noexcept { return probe_radius > 0.0 ? 0 : 600; }
 };
 
 /// Validated and immutable: `step` cannot fail on it. Copies share the surfaces.
@@ -66,6 +73,10 @@ class Scene {
   [[nodiscard]] double lends() const noexcept { return lends_; }
   /// Whether a surface that moves the proxy may move or change its shape under it. [servo]
   [[nodiscard]] bool changes() const noexcept { return changes_; }
+  /// What a tick may look at; 0: no limit. [servo]
+  [[nodiscard]] std::uint32_t budget() const noexcept {
+    return settings_.budget.value_or(SceneSettings::budget_for(settings_.probe_radius));
+  }
   /// Radius of the probe's tip in the scene (m); 0 is a point. [servo]
   [[nodiscard]] double probe_radius() const noexcept { return settings_.probe_radius / settings_.view.zoom; }
   /// Tells snapshots apart, never 0. A state made for another one re-acquires its contacts. [servo]

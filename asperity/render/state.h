@@ -89,6 +89,9 @@ struct ProxyState {
   /// Level at which volumes larger than memory are felt: -1, the finest that is in memory; 0 or more, this one, as a
   /// replay does after having it fetched.
   int wanted_level = -1;
+  /// Ticks one after the other, this one last, whose budget was spent before the proxy was at rest (work_left).
+  std::uint32_t open_ticks = 0;
+  bool idle = false;  ///< the last tick ended before the proxy was at rest, and brought it no nearer
 };
 static_assert(sizeof(ProxyState) <= 4800);
 
@@ -102,14 +105,18 @@ class ProxyCache {
     for (Entry& entry : entries_) {
       if (entry.instance == instance) {
         entry.used = ++clock_;
+        entry.cache.work = &work_;
         return entry.cache;
       }
       if (entry.used < oldest->used) oldest = &entry;
     }
     oldest->instance = instance;
     oldest->used = ++clock_;
+    oldest->cache.work = &work_;
     return oldest->cache;
   }
+  /// What the last tick looked at. [servo]
+  [[nodiscard]] WorkMeter& work() noexcept { return work_; }
 
  private:
   struct Entry {
@@ -119,6 +126,7 @@ class ProxyCache {
   };
   std::array<Entry, most_contacts> entries_;
   std::uint64_t clock_ = 0;
+  WorkMeter work_;
 };
 
 }  // namespace asperity

@@ -38,6 +38,7 @@ ForceSample step(const Scene& scene, ProxyState& state, ProxyCache& cache, const
   Tick tick(scene, state, cache, probe, dt, out);
   if (!sample(tick)) return out;
   const VolumeReading reading(scene);
+  cache.work().begin(scene.budget());
   reach(tick);
   carry(tick);
   constrain(tick);

@@ -115,7 +115,7 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& se
 /// The same in one call. [main]
 RunMetrics measure_run(std::span<const TraceRecord> records, const Scene& scene, const StrokePath& path);
 
-/// "contact", "not_converged", ...: the name of flag bit `bit`, 0 to 10; "unknown" beyond. [any]
+/// "contact", "not_converged", ...: the name of flag bit `bit`, 0 to 12; "unknown" beyond. [any]
 const char* flag_name(std::size_t bit);
 
 /// The numbers as JSON text, SI, without spectra and histograms; not-a-number becomes null. [main]

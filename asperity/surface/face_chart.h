@@ -33,6 +33,11 @@ class FaceChart {
   FaceChart(const Faces& faces, Place& place, Spot& spot) noexcept : faces_(faces), place_(place), spot_(spot) {}
 
   [[nodiscard]] const Spot& spot() const noexcept { return spot_; }
+  /// Evaluations so far.
+  [[nodiscard]] std::uint32_t work() const noexcept requires requires(const Faces& faces) { faces.work(); }
+  { return faces_.work(); }
+  /// Faces that it has looked at beside the first.
+  [[nodiscard]] std::uint32_t frames() const noexcept { return frames_; }
   [[nodiscard]] WalkForms forms(const Vec3& goal) const noexcept { return faces_.forms(place_, spot_, goal); }
   void slope(const Vec3& goal, WalkForms& forms) const noexcept {
     const Vec3 rest = spot_.point - goal;
@@ -160,6 +165,7 @@ class FaceChart {
     // Beyond the rim there is nothing that could hold the point.
     if (!cross_edge(across, k)) return may_leave ? Turn::rim : along_edge(step, goal, k, rest);
     ++moves;
+    ++frames_;
     const Spot there = faces_.evaluate(across.frame, across.u, across.v);
     // Without stitching the other face may stand higher: a wall.
     const bool wall = faces_.jumps() && (there.point - goal).squaredNorm() > (spot_.point - goal).squaredNorm();
@@ -196,6 +202,7 @@ class FaceChart {
       here.u = t[1] == vertex ? 1.0 : 0.0;
       here.v = t[2] == vertex ? 1.0 : 0.0;
       ++moves;
+      ++frames_;
       const Spot spot = faces_.evaluate(here.frame, here.u, here.v);
       const int own = t[0] == vertex ? 0 : (t[1] == vertex ? 1 : 2);
       const WalkStep options[3] = {step_at(here, spot, goal), step_along_edge(here, spot, goal, (own + 1) % 3),
@@ -218,6 +225,7 @@ class FaceChart {
   const Faces& faces_;
   Place& place_;
   Spot& spot_;
+  std::uint32_t frames_ = 0;
 };
 
 }  // namespace asperity

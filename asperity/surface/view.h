@@ -4,6 +4,7 @@
 #include <concepts>
 
 #include "asperity/core/place.h"
+#include "asperity/core/work.h"
 #include "asperity/field/volume/cell_polynomial.h"
 #include "asperity/field/volume/sparse_grid.h"
 #include "asperity/geometry/contact.h"
@@ -38,6 +39,11 @@ struct SurfaceCache {
   FacePlace<FlatFrame> flat;  ///< the face of a bare mesh that was asked about last
   CellCache cells;
   SparseHint sparse;
+  WorkMeter* work = nullptr;  ///< what queries tell what they took, in the caller's hands; none: nothing
+  /// [servo]
+  void took(const WorkCount& count) const noexcept {
+    if (work != nullptr) work->add(count);
+  }
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.
@@ -64,7 +70,10 @@ struct Goal {
   bool may_leave = true;      ///< false: stays on the surface whatever the goal (closest points)
   Sides sides = Sides::both;  ///< that can be in the way
   bool exactly = false;       ///< goes on until rounding alone is left, of reliefs
-  int moves = 1024;           ///< evaluations that it may take
+  int moves = 1024;           ///< places that it may look at
+  /// The same of evaluations, where a place may take several of them.
+  std::uint32_t work = no_limit;
+  static constexpr std::uint32_t no_limit = ~0U;
 };
 
 /// What one surface is during one tick, in its own object frame: a few pointers and what is felt of it now (a level, a

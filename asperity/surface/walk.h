@@ -104,15 +104,16 @@ enum class Turn { go, rest, rim };
 /// which a step is not made; blocked(step), whether it leads over a border that the place is on, and turn(step, goal,
 /// may_leave, moves), which then finds another one; reach(step, border), how much of a step lies within the chart, and
 /// what it ends at (-1: nothing); start(), the place; moved(start, step, share, border), the place there;
-/// evaluate(place, spot); take(place, spot), which goes there; stride(). Where flanks may meet (has_flanks):
-/// direction(step) in space, and towards(way), the step that leads along it. [servo]
+/// evaluate(place, spot); take(place, spot), which goes there; stride(); work(), evaluations so far, where a place may
+/// take several. Where flanks may meet (has_flanks): direction(step) in space, and towards(way), the step that leads
+/// along it. [servo]
 template <class Chart>
 class Walk {
  public:
   Walk(Chart& chart, const Goal& goal, double side) noexcept : chart_(chart), asked_(goal), side_(side) {}
 
   DescentEnd run() noexcept {
-    while (moves_ < asked_.moves) {
+    while (!out_of_moves()) {
       if (asked_.may_leave && leaves()) return DescentEnd::left;
       aim();
       if (settled()) return DescentEnd::rest;
@@ -132,8 +133,18 @@ class Walk {
     }
     return DescentEnd::limited;
   }
+  /// Evaluations that it took. [servo]
+  [[nodiscard]] std::uint32_t moves() const noexcept { return static_cast<std::uint32_t>(moves_); }
 
  private:
+  [[nodiscard]] bool out_of_moves() const noexcept {
+    if (moves_ >= asked_.moves) return true;
+    if constexpr (requires { chart_.work(); }) {
+      return chart_.work() >= asked_.work;
+    } else {
+      return moves() >= asked_.work;
+    }
+  }
   /// Far behind a surface that is bent much there is no end to small moves that change no force.
   [[gnu::noinline]] bool creeps() noexcept {
     const double now = (chart_.spot().point - asked_.point).norm();
@@ -201,7 +212,7 @@ class Walk {
     for (int i = 1; i <= count; ++i) {
       if (!attempt(far * i / count, i == count ? border : -1)) break;
       any = true;
-      if (moves_ >= asked_.moves) return true;
+      if (out_of_moves()) return true;
     }
     if (any) return true;
     shortened_ = true;

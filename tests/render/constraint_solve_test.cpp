@@ -193,7 +193,7 @@ RC_GTEST_PROP(JointSolve, reaches_the_nearest_point_of_a_convex_cell_within_one_
   ProbeSample probe;
   probe.pose.position = goal;
   const ForceSample felt = step(scene, state, probe, Seconds(1e-3));
-  RC_ASSERT(!felt.flags.has(TickFlag::not_converged));
+  RC_ASSERT(!unfinished(felt.flags));
   for (const ConstraintPlane& one : planes) RC_ASSERT(one.normal.dot(state.proxy) >= one.offset);
   const PlaneProjection best = project_onto_planes(goal, planes, true);
   RC_ASSERT((state.proxy - best.point).norm() <= 1e-3);

@@ -96,7 +96,7 @@ void poke_and_slide(const Scene& scene, const MeshSurface& surface, double radiu
     const double outside = surface.eval(state.proxy, oracle).value - radius;
     ++tally.ticks;
     tally.touching += force.flags.has(TickFlag::contact) ? 1 : 0;
-    tally.unconverged += force.flags.has(TickFlag::not_converged) ? 1 : 0;
+    tally.unconverged += unfinished(force.flags) ? 1 : 0;
     tally.worst_inside = std::max(tally.worst_inside, -outside);
     if (outside < -1e-9 * mesh.bounds().diagonal()) ++tally.through;
     const double strength = force.wrench.force.norm();
@@ -213,7 +213,7 @@ TEST(GodObject, ConcaveCornerHoldsTheProxyOnThreePlanes) {
     const ForceSample force = step(scene, state, at(probe), tick);
     const Vec3 corner = Vec3::Constant(0.05 - radius);
     EXPECT_LT((force.wrench.force - stiffness * (corner - probe)).norm(), 1e-6);
-    EXPECT_FALSE(force.flags.has(TickFlag::not_converged));
+    EXPECT_FALSE(unfinished(force.flags));
   }
 }
 
@@ -231,7 +231,7 @@ TEST(GodObject, ProxyIsALocalMinimumOfItsDistanceToTheProbe) {
     for (int i = 0; i < 300; ++i) {
       probe += 0.3 * edge * random_direction(rng) - 0.01 * probe;
       const ForceSample force = step(scene, state, at(probe), tick);
-      if (force.flags.has(TickFlag::not_converged)) continue;
+      if (unfinished(force.flags)) continue;
       const double distance = (state.proxy - probe).norm();
       for (int j = 0; j < 8; ++j) {
         const Vec3 neighbour = state.proxy + 0.02 * edge * random_direction(rng);

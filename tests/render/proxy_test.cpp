@@ -122,7 +122,7 @@ RC_GTEST_PROP(ProxyInvariants, without_friction_the_force_is_the_spring_along_th
     }
     RC_ASSERT((force - stiffness * (felt.proxy - probe)).norm() <= 1e-9);
     // Out of its budget the proxy may still be on its way around a bend.
-    if (felt.flags.has(TickFlag::not_converged)) continue;
+    if (unfinished(felt.flags)) continue;
     RC_ASSERT(force.dot(felt.contact.normal) >= -stiffness * surface->skin());
   }
 }

@@ -42,7 +42,7 @@ Truth compare(const WavySphere& sphere, const std::shared_ptr<const ReliefSurfac
     const Vec3 force = felt.wrench.force;
     const Vec3 right = stiffness * (exact.follow(probe) - probe);
     if (!felt.flags.has(TickFlag::contact)) ++truth.lost;
-    if (felt.flags.has(TickFlag::not_converged) || felt.flags.has(TickFlag::energy_limited)) ++truth.flagged;
+    if (unfinished(felt.flags) || felt.flags.has(TickFlag::energy_limited)) ++truth.flagged;
     errors.push_back(std::atan2(force.cross(right).norm(), force.dot(right)) * 180.0 / std::numbers::pi);
     if (i > 0) {
       truth.jump = std::max(truth.jump, (force - last).norm());

@@ -202,7 +202,7 @@ std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally
     std::ostringstream text;
     text << what << " by " << size << " at tick " << tally.ticks << ", probe " << probe.transpose() << ", proxy "
          << sample.proxy.transpose() << ", force " << sample.wrench.force.transpose() << ", converged "
-         << !sample.flags.has(TickFlag::not_converged) << ", proxy outside by" << bodies.clearances(sample.proxy);
+         << !unfinished(sample.flags) << ", proxy outside by" << bodies.clearances(sample.proxy);
     wrong = text.str();
   };
   Vec3 probe = bodies.at_clearance(rng, bodies.junction(), 4e-3, 1e-3);

@@ -212,7 +212,8 @@ TEST(Flags, EveryBitHasItsName) {
   EXPECT_STREQ(flag_name(9), "coarse_data");
   EXPECT_STREQ(flag_name(10), "field_force");
   EXPECT_STREQ(flag_name(11), "texture_faded");
-  EXPECT_STREQ(flag_name(12), "unknown");
+  EXPECT_STREQ(flag_name(12), "work_left");
+  EXPECT_STREQ(flag_name(13), "unknown");
 }
 
 // --- pictures ---

@@ -303,7 +303,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   const auto remember_nearest = [&] {
     if ((solution.proxy - goal).squaredNorm() < (nearest - goal).squaredNorm()) nearest = solution.proxy;
   };
-  for (int move = 0; move < most_moves; ++move) {
+  for (int move = 0; move < most_moves && !work_.spent(); ++move) {
     const bool patient = move >= patience;
     if (patient) remember_nearest();
     if (patient) earlier = planes;
@@ -350,7 +350,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
 void JointSolve::settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept {
   constexpr int most_moves = 160;
   Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
-  for (int move = 0; move < most_moves; ++move) {
+  for (int move = 0; move < most_moves && !work_.spent(); ++move) {
     solution.planes.clear();
     touched(solution.proxy, solution.planes);
     const Vec3 target = project_onto_planes(goal, solution.planes, true).point;

@@ -15,8 +15,9 @@ using GeneratedPatches = FixedVector<GeneratedPatch, most_contacts>;
 /// The instances whose proxy is solved jointly this tick, in the world frame.
 class JointSolve {
  public:
-  /// `patches`: where facets may be generated. [servo]
-  JointSolve(double probe_radius, GeneratedPatches* patches) noexcept : radius_(probe_radius), patches_(patches) {}
+  /// `patches`: where facets may be generated; `work`: what the tick may look at. [servo]
+  JointSolve(double probe_radius, GeneratedPatches* patches, const WorkMeter& work) noexcept
+      : radius_(probe_radius), patches_(patches), work_(work) {}
   void add(Touched& touch) noexcept;
   [[nodiscard]] bool empty() const noexcept { return entries_.empty(); }
 
@@ -79,7 +80,8 @@ class JointSolve {
   [[nodiscard]] bool touches(const Held& held, const Vec3& position) const noexcept;
   void hold(std::size_t index, const Place& place, const Vec3& normal, Held& held) const noexcept;
   void attach(const Vec3& position) noexcept;
-  DescentEnd walk(Held& held, const Vec3& goal, bool may_leave, int moves) const noexcept;
+  DescentEnd walk(Held& held, const Vec3& goal, bool may_leave, int moves,
+                  std::uint32_t work = Goal::no_limit) const noexcept;
   [[nodiscard]] ConstraintPlane plane_at(const Held& held) const noexcept;
   void planes_at(const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] Met first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept;
@@ -119,6 +121,7 @@ class JointSolve {
 
   double radius_;
   GeneratedPatches* patches_;
+  const WorkMeter& work_;
   FixedVector<Entry, most_contacts> entries_;
   FixedVector<ConstraintPlane, 6> feet_;  ///< found while the ball moved
   bool met_ = false;                      ///< the last advance has found more of them

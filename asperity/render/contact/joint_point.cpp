@@ -94,14 +94,18 @@ void JointSolve::attach(const Vec3& position) noexcept {
   }
 }
 
-DescentEnd JointSolve::walk(Held& held, const Vec3& goal, bool may_leave, int moves) const noexcept {
+DescentEnd JointSolve::walk(Held& held, const Vec3& goal, bool may_leave, int moves,
+                            std::uint32_t work) const noexcept {
   const Touched& touch = *entries_[held.owner].touch;
   return on_smooth_view(touch.view, [&](const auto& view) {
     using Spot = typename std::decay_t<decltype(view)>::Spot;
     Spot spot = view.at(held.place, held.place.side() * touch.turned_back(held.normal));
-    const DescentEnd end = view.descend(
-        held.place, spot,
-        {.point = touch.to_local(goal), .may_leave = may_leave, .sides = touch.facts->sides, .moves = moves});
+    const DescentEnd end = view.descend(held.place, spot,
+                                        {.point = touch.to_local(goal),
+                                         .may_leave = may_leave,
+                                         .sides = touch.facts->sides,
+                                         .moves = moves,
+                                         .work = work});
     held.point = touch.to_world(spot.point);
     held.normal = held.place.side() * touch.turned(spot.front);
     return end;
@@ -215,10 +219,10 @@ bool JointSolve::onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexce
 /// Along one surface to the goal, or to what is in the way: `stopped`, then. Whether it came to rest on it.
 bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept {
   stopped = no_owner;
-  for (int walked = 0, leg = first_leg; walked < most_walk; walked += leg, leg *= 2) {
+  for (int walked = 0, leg = first_leg; walked < most_walk && !work_.spent(); walked += leg, leg *= 2) {
     HeldSet before;
     before.push_back(held_[which]);
-    const DescentEnd end = walk(held_[which], goal, true, leg);
+    const DescentEnd end = walk(held_[which], goal, true, leg, work_.left());
     HeldSet after;
     after.push_back(held_[which]);
     const Vec3 to = held_[which].point;
@@ -374,7 +378,7 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
   int learned = 0;
   int idle = 0;
   std::size_t stopped = no_owner;
-  for (int move = 0; move < most_moves && !solution.converged; ++move) {
+  for (int move = 0; move < most_moves && !solution.converged && !work_.spent(); ++move) {
     planes_at(proxy, planes);
     PlaneProjection projection = project_onto_planes(goal, planes, true);
     const Vec3 before = proxy;

@@ -14,8 +14,9 @@ class PointProxy {
  public:
   using Spot = typename View::Spot;
 
-  PointProxy(const View& view, Sides sides, const Friction& friction, const Vec3& probe, OfSurface& state) noexcept
-      : view_(view), sides_(sides), friction_(friction), probe_(probe), state_(state) {}
+  PointProxy(const View& view, Sides sides, const Friction& friction, const Vec3& probe, OfSurface& state,
+             const WorkMeter& work) noexcept
+      : view_(view), sides_(sides), friction_(friction), probe_(probe), state_(state), work_(work) {}
 
   [[gnu::always_inline]] inline PointRest run(const Vec3& from) noexcept {
     // One tick may leave the surface and meet it again this often: over a field of needles.
@@ -36,7 +37,8 @@ class PointProxy {
       if constexpr (on_triangles) {
         const bool near = end == DescentEnd::left && (probe_ - spot_.point).dot(normal()) <= 2.0 * view_.skin();
         const bool between = end == DescentEnd::rest && !view_.within_face(place_);
-        if (near || between || end == DescentEnd::limited || end == DescentEnd::blocked) return {.simple = false};
+        const bool limited = end == DescentEnd::limited && !work_.spent();
+        if (near || between || limited || end == DescentEnd::blocked) return {.simple = false};
       }
       if (end != DescentEnd::left && end != DescentEnd::rim) return resting(end != DescentEnd::limited);
       if (end == DescentEnd::left && friction_.grip > 0.0 && holds_on()) {
@@ -49,6 +51,7 @@ class PointProxy {
       if (!view_.launch(place_, spot_, start)) return resting(true);
       if (pinched(start)) start = spot_.point;
       if (flies_in_vain()) break;
+      if (work_.spent()) break;
       if (!fly(start)) return free();
     }
     return resting(false);
@@ -147,68 +150,20 @@ class PointProxy {
 
   /// From one fold to another that overlaps it in space; where the probe draws it into both, along the crease between
   /// them. Each move comes nearer.
-  [[gnu::noinline]] DescentEnd settle_over_folds() noexcept {
-    constexpr int most_moves = 24;
-    constexpr double most_grains = 16.0;
-    recall_flanks();
-    for (int move = 0; move < most_moves && moves_ < most_moves_of_tick; ++move, ++moves_) {
-      PlaneSet planes;
-      planes.push_back(plane_through(spot_.point, normal()));
-      for (const Flank& flank : flanks_) planes.push_back(plane_through(flank.spot.point, flank.normal()));
-      const PlaneProjection held = project_onto_planes(probe_, planes, false);
-      if (held.active.size() < 2) {
-        if (!held.active.empty() && held.active[0].plane > 0 && !lead_with(held.active[0].plane - 1))
-          return DescentEnd::rest;
-        flanks_.clear();
-        DescentEnd end = DescentEnd::rest;
-        const Way way = go(end, [&](int moves) { return settle_on_fold(moves); });
-        if (way == Way::on) continue;
-        return way == Way::free ? end : DescentEnd::rest;
-      }
-      Vec3 way = along_crease(held) - spot_.point;
-      const double most = most_grains * view_.grain();
-      if (way.norm() > most) way *= most / way.norm();
-      if (way.norm() <= view_.skin()) return DescentEnd::rest;
-      const Way end = go_along(way);
-      if (end == Way::on) continue;
-      if (end == Way::stuck) return DescentEnd::rest;
-      for (Flank& flank : flanks_) view_.descend(flank.place, flank.spot, {.point = spot_.point, .may_leave = false});
-    }
-    return DescentEnd::limited;
-  }
+  [[gnu::noinline]] DescentEnd settle_over_folds() noexcept;
 
   /// What the last tick left it beside.
-  void recall_flanks() noexcept {
-    flanks_.clear();
-    if (!state_.rests) return;
-    for (std::size_t i = 1; i < state_.places.size(); ++i) {
-      Flank flank{state_.places[i], {}};
-      flank.spot = view_.at(flank.place, flank.place.side() * state_.normal);
-      if ((flank.spot.point - spot_.point).norm() <= view_.grain()) flanks_.push_back(flank);
-    }
-    state_.places.clear();
-  }
+  void recall_flanks() noexcept;
 
   /// Takes a flank for the fold that it is on. False, and nothing done, where that is farther.
-  bool lead_with(std::size_t index) noexcept {
-    const Flank flank = flanks_[index];
-    if (!no_farther(flank.spot.point, spot_.point, probe_)) return false;
-    flanks_[index] = {place_, spot_};
-    place_ = flank.place;
-    spot_ = flank.spot;
-    return true;
-  }
+  bool lead_with(std::size_t index) noexcept;
 
   /// Where the probe leads it along a crease: to the nearest point of the tangent planes, less what friction holds.
-  Vec3 along_crease(const PlaneProjection& held) noexcept {
-    const Vec3 way = held.point - spot_.point;
-    if (friction_.still <= 0.0) return held.point;
-    double push = 0.0;
-    for (const PlaneProjection::Active& one : held.active) push += one.multiplier;
-    const double length = way.norm();
-    state_.sliding = length > (state_.sliding ? friction_.sliding : friction_.still) * push;
-    if (!state_.sliding) return spot_.point;
-    return held.point - std::min(1.0, friction_.sliding * push / length) * way;
+  Vec3 along_crease(const PlaneProjection& held) noexcept;
+
+  /// A flank's place nearest to where it is.
+  [[nodiscard]] Goal beside() const noexcept {
+    return {.point = spot_.point, .may_leave = false, .work = work_.left()};
   }
 
   [[nodiscard]] bool nearer(const Spot& before) const noexcept {
@@ -223,48 +178,11 @@ class PointProxy {
     stuck,  ///< another fold, no nearer: it is where it was
   };
   /// Along a crease; `stuck` where that comes no nearer.
-  Way go_along(const Vec3& step) noexcept {
-    const Place place = place_;
-    const Spot spot = spot_;
-    DescentEnd end = DescentEnd::rest;
-    const auto lead = [&](int moves) {
-      return view_.descend(place_, spot_, {.point = spot.point + step, .may_leave = false, .moves = moves});
-    };
-    const Way way = go(end, lead, short_walk);
-    if (way == Way::on || (way == Way::free && nearer(spot))) return way;
-    place_ = place;
-    spot_ = spot;
-    return Way::stuck;
-  }
+  Way go_along(const Vec3& step) noexcept;
 
   /// In legs, so that what is in the way is seen before much has been walked in vain.
   template <class Lead>
-  Way go(DescentEnd& end, const Lead& lead, int most = most_walk) noexcept {
-    constexpr int first_leg = 24;
-    const Spot begin = spot_;
-    Place place;
-    Spot spot;
-    SweptHit hit;
-    for (int walked = 0, leg = first_leg; !hit.hit; walked += leg, leg *= 2) {
-      place = place_;
-      spot = spot_;
-      end = lead(leg);
-      hit = view_.between(place, spot, place_, spot_, sides_);
-      if (end != DescentEnd::limited || walked + leg >= most) break;
-    }
-    if (!hit.hit) return Way::free;
-    Flank left{place, spot};
-    take(hit);
-    if (!nearer(spot)) {
-      place_ = place;
-      spot_ = spot;
-      return nearer(begin) ? Way::on : Way::stuck;
-    }
-    view_.descend(left.place, left.spot, {.point = spot_.point, .may_leave = false});
-    if (flanks_.size() == flanks_.capacity()) flanks_.swap_remove(0);
-    flanks_.push_back(left);
-    return Way::on;
-  }
+  Way go(DescentEnd& end, const Lead& lead, int most = most_walk) noexcept;
 
   [[gnu::always_inline]] inline DescentEnd settle_on_fold(int moves = most_walk) noexcept {
     if (friction_.still <= 0.0) return slide(0.0, moves);
@@ -281,7 +199,8 @@ class PointProxy {
   }
 
   DescentEnd slide(double friction, int moves = most_walk) noexcept {
-    return view_.descend(place_, spot_, {.point = probe_, .friction = friction, .sides = sides_, .moves = moves});
+    return view_.descend(
+        place_, spot_, {.point = probe_, .friction = friction, .sides = sides_, .moves = moves, .work = work_.left()});
   }
 
   const View& view_;
@@ -289,6 +208,7 @@ class PointProxy {
   const Friction& friction_;
   Vec3 probe_;
   OfSurface& state_;
+  const WorkMeter& work_;
   Place place_;
   Spot spot_;
   FixedVector<Flank, 2> flanks_;

@@ -43,6 +43,8 @@ void answer(Tick& tick) noexcept {
   ForceSample& out = tick.out;
   out.wrench.force = handed_over(tick, out.wrench.force);
   if (!tick.converged) out.flags.set(TickFlag::not_converged);
+  if (tick.open) out.flags.set(TickFlag::work_left);
+  state.open_ticks = tick.open ? state.open_ticks + 1 : 0;
   if (tick.limited) out.flags.set(TickFlag::energy_limited);
   if (tick.scene.changes()) remember_sides(tick);
   state.force = out.wrench.force;

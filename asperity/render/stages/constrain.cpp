@@ -3,7 +3,7 @@
 #include "asperity/render/contact/fine.h"
 #include "asperity/render/contact/joint.h"
 #include "asperity/render/contact/level.h"
-#include "asperity/render/contact/point.h"
+#include "asperity/render/contact/point_folds.h"
 #include "asperity/render/local_material.h"
 #include "asperity/render/stages/tick.h"
 
@@ -96,7 +96,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   const Friction friction = friction_of(touch, material_there(touch, place, room));
   const bool rested = surface.rests;
   const bool slid = surface.sliding;
-  PointProxy<View> point(view, touch.facts->sides, friction, touch.to_local(position), surface);
+  PointProxy<View> point(view, touch.facts->sides, friction, touch.to_local(position), surface, tick.cache.work());
   const PointRest rest = point.run(from);
   if (!rest.simple) {
     surface.rests = rested;
@@ -122,7 +122,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
 void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   ProxyState& state = tick.state;
   const Vec3& position = tick.probe->pose.position;
-  JointSolve joint(tick.scene.probe_radius(), patches);
+  JointSolve joint(tick.scene.probe_radius(), patches, tick.cache.work());
   const Vec3 before = state.proxy;
   Vec3 from = before;
   bool rubs = false;
@@ -178,6 +178,20 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   constrain_jointly(tick, &patches);
 }
 
+/// Whether a proxy that is not at rest has anything left to do. `before`: where the tick found it.
+void see_what_is_left(Tick& tick, const Vec3& before) noexcept {
+  // All that two ticks can do, for what no hand could tell, is as good as a rest. One may have flown in vain.
+  constexpr double least_gain = 1e-4;
+  ProxyState& state = tick.state;
+  const Vec3& position = tick.probe->pose.position;
+  const bool idle =
+      !tick.converged && (state.proxy - position).norm() >= (1.0 - least_gain) * (before - position).norm();
+  if (idle && state.idle) tick.converged = true;
+  state.idle = idle;
+  tick.open = !tick.converged && tick.cache.work().spent();
+  tick.converged = tick.converged || tick.open;
+}
+
 }  // namespace
 
 void constrain(Tick& tick) noexcept {
@@ -199,6 +213,7 @@ void constrain(Tick& tick) noexcept {
   // What several planes of a mesh held, they mostly hold on.
   const bool alone = count == 1 && point && !last->facts->by_planes &&
                      (last->facts->smooth || last->contact->surface.places.size() <= 1);
+  const Vec3 before = tick.state.proxy;
   if (alone) tick.state.sliding = last->contact->surface.sliding;
   if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick); })) {
     if (facets) {
@@ -207,6 +222,7 @@ void constrain(Tick& tick) noexcept {
       constrain_jointly(tick, nullptr);
     }
   }
+  see_what_is_left(tick, before);
 }
 
 }  // namespace asperity

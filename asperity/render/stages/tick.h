@@ -48,6 +48,7 @@ struct Tick {
   FixedVector<Part, most_contacts> parts;
   Vec3 felt = Vec3::Zero();  ///< the proxy to be shown: without skins
   bool converged = true;
+  bool open = false;     ///< the budget was spent before the proxy was at rest
   bool limited = false;  ///< less was rendered than there would have been, for want of energy
 
   // add

@@ -134,10 +134,11 @@ FieldSample CustomSurface::eval(const Vec3& p) const noexcept {
 }
 
 /// Leads q along the gradient onto the surface.
-bool CustomSurface::land(Vec3& q) const noexcept {
+bool CustomSurface::land(Vec3& q, WorkMeter* asked) const noexcept {
   const double least = 1e-6 * facts_.lipschitz;
   for (int i = 0; i < most_landings; ++i) {
     const FieldSample here = eval(q);
+    if (asked != nullptr) asked->add({1, 0, 0});
     const double slope = here.gradient.norm();
     if (!(slope > least) || !std::isfinite(here.value)) return false;
     // Where the field is flat its slope says nothing of how far the surface is.

@@ -91,15 +91,16 @@ class CustomSurface {
     return build(std::make_shared<const T>(std::move(field)), sizeof(T), &queries, facts, std::move(type));
   }
 
-  /// What is touched of it. [servo]
-  [[nodiscard]] CustomView view() const noexcept;
+  /// What is touched of it. `work`: what its field is asked is counted there. [servo]
+  [[nodiscard]] CustomView view(WorkMeter* work = nullptr) const noexcept;
   /// The field itself. [servo]
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
   [[nodiscard]] double skin() const noexcept { return skin_; }
   [[nodiscard]] Box bounds() const noexcept { return facts_.bounds; }
 
-  /// Leads q along the gradient onto the surface, to within settled(). [servo]
-  [[nodiscard]] bool land(Vec3& q) const noexcept;
+  /// Leads q along the gradient onto the surface, to within settled(); `asked`, where it is given, counts the field's
+  /// answers. [servo]
+  [[nodiscard]] bool land(Vec3& q, WorkMeter* asked = nullptr) const noexcept;
   /// Whether q lies in the box that holds the surface. [servo]
   [[nodiscard]] bool holds(const Vec3& q) const noexcept {
     const Box box = facts_.bounds.grown(skin_);

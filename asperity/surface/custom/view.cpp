@@ -37,8 +37,8 @@ class FieldChart {
     const double slope = spot_.gradient.norm();
     if (std::hypot(f.g_u, f.g_v) <= rest_length(true) || !(slope > 0.0)) return f;
     const double step = 1e-3 * surface_.grain();
-    const Vec3 by_u = surface_.eval(spot_.point + step * along_u_).gradient - spot_.gradient;
-    const Vec3 by_v = surface_.eval(spot_.point + step * along_v_).gradient - spot_.gradient;
+    const Vec3 by_u = view_.eval(spot_.point + step * along_u_).gradient - spot_.gradient;
+    const Vec3 by_v = view_.eval(spot_.point + step * along_v_).gradient - spot_.gradient;
     const double per = 1.0 / (step * slope);
     // Across an edge the differences are no bend: the steps go without.
     const double most = 2.0 / surface_.grain();
@@ -89,7 +89,7 @@ class FieldChart {
     return from.point + u * from.along_u + v * from.along_v - drop * from.front;
   }
   bool evaluate(Vec3 to, CustomSpot& spot) const noexcept {
-    if (!surface_.land(to) || !surface_.holds(to)) return false;
+    if (!view_.land(to) || !surface_.holds(to)) return false;
     spot = view_.on_side(to, side_);
     return free_way(spot);
   }
@@ -120,7 +120,7 @@ class FieldChart {
     const auto flies = [&](const CustomSpot& from) {
       return !view_.first_touch({from.point + skin * (side_ * from.front), apex}, Sides::both).hit;
     };
-    return side_ * surface_.eval(apex).value > 0.0 && flies(spot_) && flies(to);
+    return side_ * view_.eval(apex).value > 0.0 && flies(spot_) && flies(to);
   }
 
   const CustomView& view_;
@@ -137,7 +137,7 @@ class FieldChart {
 }  // namespace
 
 CustomSpot CustomView::spot(const Vec3& p) const noexcept {
-  const FieldSample here = surface_->eval(p);
+  const FieldSample here = eval(p);
   const double length = here.gradient.norm();
   CustomSpot spot{p, Vec3::Zero(), here.gradient, here.element};
   if (length > 0.0 && std::isfinite(length)) spot.front = here.gradient / length;
@@ -167,7 +167,7 @@ Foot CustomView::foot_at(const Vec3& p, const CustomSpot& spot) const noexcept {
   if (foot.distance > skin()) {
     foot.normal = offset / foot.distance;
   } else {
-    foot.normal = surface_->eval(p).value < 0.0 ? Vec3(-spot.front) : spot.front;
+    foot.normal = eval(p).value < 0.0 ? Vec3(-spot.front) : spot.front;
   }
   return foot;
 }
@@ -175,16 +175,17 @@ Foot CustomView::foot_at(const Vec3& p, const CustomSpot& spot) const noexcept {
 Foot CustomView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
   Foot best;
   if (surface_->queries().nearest != nullptr) {
+    took({1, 0, 0});
     best = surface_->queries().nearest(surface_->field(), p, bound);
     best.at = best.point;
     return best;
   }
-  const double value = surface_->eval(p).value;
+  const double value = eval(p).value;
   // The value cannot change faster: nothing is nearer.
   const double least = std::abs(value) / surface_->facts().lipschitz;
   if (!(least <= bound)) return best;
   const auto look_from = [&](Vec3 q) {
-    if (!surface_->land(q)) return;
+    if (!land(q)) return;
     CustomSpot there = spot(q);
     Place place{0, there.front.dot(p - q) < 0.0, q};
     descend(place, there, {.point = p, .may_leave = false});
@@ -205,6 +206,7 @@ Foot CustomView::nearest(const Vec3& p, double bound, const Place& start) const 
 
 SweptHit CustomView::first_touch(const Segment& motion, Sides sides) const noexcept {
   if (surface_->queries().first_touch == nullptr) return trace(motion, sides);
+  took({1, 0, 0});
   SweptHit hit = surface_->queries().first_touch(surface_->field(), motion, sides);
   if (!hit.hit) return hit;
   hit.contact.at = hit.contact.point;
@@ -225,14 +227,14 @@ SweptHit CustomView::trace(const Segment& motion, Sides sides) const noexcept {
   double end = length;
   if (!clip_line(facts.bounds.grown(0.01 * facts.bounds.diagonal()), motion.from, direction, t, end)) return hit;
   const double touched = touch_share * skin * facts.lipschitz;
-  FieldSample here = surface_->eval(motion.from + t * direction);
+  FieldSample here = eval(motion.from + t * direction);
   double side = here.value < 0.0 ? -1.0 : 1.0;
   // From within a solid nothing is touched until the way has come out of it.
   bool counts = sides == Sides::both || side > 0.0;
   const auto touch = [&](double distance) {
     const Vec3 place = motion.from + distance * direction;
     Vec3 q = place;
-    if (!surface_->land(q) || (q - place).norm() > 0.01 * facts.grain) q = place;
+    if (!land(q) || (q - place).norm() > 0.01 * facts.grain) q = place;
     const CustomSpot there = on_side(q, side);
     hit = point_touch(std::min(1.0, distance / length), side, there.point, there.front, there.element, there.point);
     hit.contact.distance = (place - q).norm();
@@ -253,7 +255,7 @@ SweptHit CustomView::trace(const Segment& motion, Sides sides) const noexcept {
     }
     const double before = t;
     t = std::min(t + ahead, end);
-    here = surface_->eval(motion.from + t * direction);
+    here = eval(motion.from + t * direction);
     if (side * here.value < 0.0) {
       if (counts) {
         double low = before;
@@ -261,7 +263,7 @@ SweptHit CustomView::trace(const Segment& motion, Sides sides) const noexcept {
         while (high - low > touch_share * skin) {
           const double middle = 0.5 * (low + high);
           if (middle <= low || middle >= high) break;
-          (side * surface_->eval(motion.from + middle * direction).value < 0.0 ? high : low) = middle;
+          (side * eval(motion.from + middle * direction).value < 0.0 ? high : low) = middle;
         }
         return touch(low);
       }

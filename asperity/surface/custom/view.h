@@ -19,7 +19,9 @@ class CustomView {
  public:
   using Spot = CustomSpot;
 
-  explicit CustomView(const CustomSurface& surface) noexcept : surface_(&surface) {}
+  /// `work`: as of SurfaceCache.
+  explicit CustomView(const CustomSurface& surface, WorkMeter* work = nullptr) noexcept
+      : surface_(&surface), work_(work) {}
 
   /// To within a skin (sphere tracing, Hart 1996); nothing is passed through as long as `lipschitz` holds. A search
   /// that takes too many steps ends early, as if touched there.
@@ -36,9 +38,14 @@ class CustomView {
   bool launch(const Place& place, const CustomSpot& spot, Vec3& from) const noexcept {
     from = spot.point + skin() * (place.side() * spot.front);
     // In a valley narrower than the skin there is no place to fly from.
-    return place.side() * surface_->eval(from).value >= 0.0;
+    return place.side() * eval(from).value >= 0.0;
   }
-  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p); }
+  [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept {
+    took({1, 0, 0});
+    return surface_->eval(p);
+  }
+  /// CustomSurface::land.
+  [[nodiscard]] bool land(Vec3& q) const noexcept { return surface_->land(q, work_); }
   [[nodiscard]] double skin() const noexcept { return surface_->skin(); }
   [[nodiscard]] double grain() const noexcept { return surface_->grain(); }
   [[nodiscard]] bool has_folds() const noexcept { return surface_->has_folds(); }
@@ -50,12 +57,17 @@ class CustomView {
   [[nodiscard]] SweptHit trace(const Segment& motion, Sides sides) const noexcept;
   [[nodiscard]] Foot foot_at(const Vec3& p, const CustomSpot& spot) const noexcept;
 
+  void took(const WorkCount& count) const noexcept {
+    if (work_ != nullptr) work_->add(count);
+  }
+
   const CustomSurface* surface_;
+  WorkMeter* work_;
 };
 static_assert(SurfaceView<CustomView>);
 
-inline CustomView CustomSurface::view() const noexcept {
-  return CustomView(*this);
+inline CustomView CustomSurface::view(WorkMeter* work) const noexcept {
+  return CustomView(*this, work);
 }
 
 }  // namespace asperity

@@ -43,12 +43,15 @@ class Leader {
         away_(spot.away) {}
 
   DescentEnd run() noexcept {
-    while (moves_ < budget) {
+    const std::uint32_t most = std::min(static_cast<std::uint32_t>(std::min(budget, goal_.moves)), goal_.work);
+    while (moves() < most) {
       if (const Step step = move(); step != Step::moved)
         return step == Step::rest ? DescentEnd::rest : step == Step::left ? DescentEnd::left : DescentEnd::rim;
     }
     return DescentEnd::limited;
   }
+  /// Evaluations that it took.
+  [[nodiscard]] std::uint32_t moves() const noexcept { return static_cast<std::uint32_t>(moves_); }
   /// On the side touched; zero where nothing was found out.
   [[nodiscard]] const Vec3& normal() const noexcept { return normal_; }
 
@@ -382,6 +385,7 @@ class Leader {
 DescentEnd IsoView::descend(Place& place, IsoSpot& spot, const Goal& goal) const noexcept {
   Leader leader(*this, goal, place.side(), spot);
   const DescentEnd end = leader.run();
+  took({leader.moves(), 0, 0});
   if (!leader.normal().isZero()) spot.front = place.side() * leader.normal();
   place.at = spot.point;
   return end;

@@ -108,6 +108,7 @@ class NearestSearch {
     // Downhill from the point itself: near a smooth surface that is all.
     lead(p_.cwiseMax(field.bounds().lower).cwiseMin(field.bounds().upper));
     visit(field.octree(surface_.level).root());
+    surface_.took({0, 0, cells_});
     return foot_;
   }
 
@@ -164,6 +165,7 @@ class NearestSearch {
   }
 
   void visit_cell(const CellIndex& index) noexcept {
+    ++cells_;
     CellPolynomial& cell = surface_.cells->other;
     if (surface_.field->approach(surface_.level, index, surface_.threshold, cell) != CellSide::near) return;
     // Within the cell the surface is looked for from its place nearest to p, towards its middle and its corners.
@@ -237,6 +239,7 @@ class NearestSearch {
   double best_;
   const Place& start_;
   Foot foot_;
+  std::uint32_t cells_ = 0;  ///< that it has looked into
 };
 
 }  // namespace
@@ -254,7 +257,9 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
   CellPolynomial& polynomial = cells->slot(field->identity(), level, walk.cell());
   double sign = 0.0;  // of value - threshold; 0: not known yet
   std::uint32_t leaf[3] = {no_index, no_index, no_index};
+  WorkCount count;
   for (bool more = true; more;) {
+    ++count.evaluations;
     const CellIndex& cell = walk.cell();
     bool same_leaf = true;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -289,6 +294,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
     }
     // What passes the threshold right on a face is neither cell's; the next one shows that it has.
     if (side != CellSide::near && !field->load(level, cell, polynomial)) break;
+    ++count.frames;
     if (sign == 0.0) {
       const double value = polynomial.value(motion.from + walk.entry() * (motion.to - motion.from));
       sign = value > threshold || (value == threshold && sigma > 0.0) ? 1.0 : -1.0;
@@ -303,10 +309,11 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
       const Vec3 gradient = sigma * polynomial.gradient(crossing.point).gradient;
       const double length = gradient.norm();
       if (length > 0.0) crossing.outward = gradient / length;
-      return crossing;
+      break;
     }
     more = walk.next();
   }
+  took(count);
   return crossing;
 }
 

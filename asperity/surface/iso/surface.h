@@ -48,6 +48,7 @@ struct IsoView {
   double threshold = 0.0;
   double sigma = 1.0;  ///< 1 where low values are inside, -1 where high ones are: phi = sigma (value - threshold)
   CellCache* cells = nullptr;
+  WorkMeter* work = nullptr;  ///< as of SurfaceCache
 
   /// Value and gradient of the field itself. False outside the volume and where nothing is known.
   bool sample(const Vec3& p, FieldJet& out) const noexcept {
@@ -90,6 +91,9 @@ struct IsoView {
     return number == no_index ? 0 : number;
   }
   [[nodiscard]] std::uint32_t element_at(const Vec3& p) const noexcept { return element_of(field->cell_of(level, p)); }
+  void took(const WorkCount& count) const noexcept {
+    if (work != nullptr) work->add(count);
+  }
 };
 static_assert(SurfaceView<IsoView>);
 
@@ -127,9 +131,14 @@ class IsoSurface {
   [[nodiscard]] double typical_slope() const noexcept { return typical_slope_; }
   /// The finest level at the surface's own threshold. [servo]
   [[nodiscard]] IsoView view(CellCache& cells) const noexcept { return view(cells, 0, threshold_); }
-  [[nodiscard]] IsoView view(SurfaceCache& cache) const noexcept { return view(cache.cells); }
+  [[nodiscard]] IsoView view(SurfaceCache& cache) const noexcept { return view(cache, 0, threshold_); }
   [[nodiscard]] IsoView view(CellCache& cells, int level, double threshold) const noexcept {
     return {field_.get(), level, threshold, inside_ == Inside::low ? 1.0 : -1.0, &cells};
+  }
+  [[nodiscard]] IsoView view(SurfaceCache& cache, int level, double threshold) const noexcept {
+    IsoView felt = view(cache.cells, level, threshold);
+    felt.work = cache.work;
+    return felt;
   }
   [[nodiscard]] double skin() const noexcept { return 1e-6 * field_->narrowest_cell(); }
   [[nodiscard]] Box bounds() const noexcept { return field_->bounds(); }

@@ -125,7 +125,9 @@ DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal)
   at.u = place.at[1];
   at.v = place.at[2];
   FaceChart<FlatFaces> chart(faces, at, spot);
-  const DescentEnd end = Walk<FaceChart<FlatFaces>>(chart, goal, place.side()).run();
+  Walk<FaceChart<FlatFaces>> walk(chart, goal, place.side());
+  const DescentEnd end = walk.run();
+  cache_->took({walk.moves(), 0, chart.frames()});
   place.element = at.frame.face;
   place.at = {1.0 - at.u - at.v, at.u, at.v};
   return blocked ? DescentEnd::blocked : end;

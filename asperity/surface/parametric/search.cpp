@@ -207,6 +207,8 @@ class Crossing {
   bool found = false;
   double t = 1.0;
   Vec2 uv = Vec2::Zero();
+  /// Each with the surface in its middle.
+  [[nodiscard]] WorkCount count() const noexcept { return {2 * static_cast<std::uint32_t>(nodes_), 0, 0}; }
 
  private:
   /// Part of the segment that comes within the bound; empty where first > last.
@@ -322,17 +324,18 @@ class Crossing {
 /// Nearest place of the whole surface.
 class Nearest {
  public:
-  Nearest(const ParametricSurface& surface, const Vec3& p, double bound) noexcept
-      : surface_(surface), patches_(surface), p_(p), best_(bound) {
+  Nearest(const ParametricSurface& surface, const Vec3& p, double bound, WorkMeter* work) noexcept
+      : surface_(surface), work_(work), patches_(surface), p_(p), best_(bound) {
     tolerance_ = closest_of_size * surface.bounds().diagonal();
     limit_ = best_ - tolerance_;
   }
 
   /// Descends from a place to the nearest one around, and keeps that where it is the best.
   void take(const Vec2& from) noexcept {
-    ParametricSpot at = surface_.view().spot(from);
+    const ParametricView view = surface_.view(work_);
+    ParametricSpot at = view.spot(from);
     Place place{0, at.front.dot(p_ - at.point) < 0.0, {from.x(), from.y(), 0.0}};
-    surface_.view().descend(place, at, {.point = p_, .may_leave = false, .exactly = true});
+    view.descend(place, at, {.point = p_, .may_leave = false, .exactly = true});
     const double distance = (at.point - p_).norm();
     if (!(distance <= best_)) return;
     found = true;
@@ -350,6 +353,8 @@ class Nearest {
   Vec2 uv = Vec2::Zero();
   ParametricSpot spot;
   [[nodiscard]] double distance() const noexcept { return best_; }
+  /// Each with the surface in its middle.
+  [[nodiscard]] WorkCount count() const noexcept { return {2 * static_cast<std::uint32_t>(nodes_), 0, 0}; }
 
  private:
   [[nodiscard]] double least(const Patch& patch, const Bound& bound) const noexcept {
@@ -396,6 +401,7 @@ class Nearest {
   }
 
   const ParametricSurface& surface_;
+  WorkMeter* work_;
   Patches patches_;
   Vec3 p_;
   double best_;
@@ -409,9 +415,10 @@ class Nearest {
 Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
   Foot foot;
   if (!(bound >= 0.0)) return foot;
-  Nearest search(*surface_, p, bound);
+  Nearest search(*surface_, p, bound, work_);
   if (start.known()) search.take(surface_->within_range(start.at.head<2>()));
   search.run(surface_->patches_);
+  took(search.count());
   if (!search.found) return foot;
   foot.point = search.spot.point;
   foot.distance = search.distance();
@@ -425,6 +432,7 @@ Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) co
 SweptHit ParametricView::first_touch(const Segment& motion, Sides sides) const noexcept {
   Crossing crossing(*surface_, motion, sides);
   crossing.run(surface_->patches_);
+  took(crossing.count());
   if (!crossing.found) return {};
   const ParametricSpot there = spot(crossing.uv);
   const double side = there.front.dot(motion.to - motion.from) > 0.0 ? -1.0 : 1.0;

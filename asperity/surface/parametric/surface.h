@@ -83,7 +83,7 @@ class ParametricSurface {
   static Result<ParametricSurface> build(const ParametricSettings& settings);
 
   /// What is touched of it. [servo]
-  [[nodiscard]] ParametricView view() const noexcept;
+  [[nodiscard]] ParametricView view(WorkMeter* work = nullptr) const noexcept;
   [[nodiscard]] double skin() const noexcept { return skin_; }
   [[nodiscard]] Box bounds() const noexcept { return bounds_; }
 

@@ -143,7 +143,9 @@ class ParameterChart {
 DescentEnd ParametricView::descend(Place& place, ParametricSpot& spot, const Goal& goal) const noexcept {
   Vec2 uv = place.at.head<2>();
   ParameterChart chart(*this, uv, spot);
-  const DescentEnd end = Walk<ParameterChart>(chart, goal, place.side()).run();
+  Walk<ParameterChart> walk(chart, goal, place.side());
+  const DescentEnd end = walk.run();
+  took({walk.moves(), 0, 0});
   place.at = {uv.x(), uv.y(), 0.0};
   return end;
 }

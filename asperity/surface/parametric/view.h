@@ -16,7 +16,9 @@ class ParametricView {
  public:
   using Spot = ParametricSpot;
 
-  explicit ParametricView(const ParametricSurface& surface) noexcept : surface_(&surface) {}
+  /// `work`: as of SurfaceCache.
+  explicit ParametricView(const ParametricSurface& surface, WorkMeter* work = nullptr) noexcept
+      : surface_(&surface), work_(work) {}
 
   /// What a point passes is bounded patch by patch, so that nothing is missed. Under Sides::front it meets what it
   /// comes to against the front.
@@ -55,12 +57,17 @@ class ParametricView {
   [[nodiscard]] const ParametricSurface& surface() const noexcept { return *surface_; }
 
  private:
+  void took(const WorkCount& count) const noexcept {
+    if (work_ != nullptr) work_->add(count);
+  }
+
   const ParametricSurface* surface_;
+  WorkMeter* work_;
 };
 static_assert(SurfaceView<ParametricView>);
 
-inline ParametricView ParametricSurface::view() const noexcept {
-  return ParametricView(*this);
+inline ParametricView ParametricSurface::view(WorkMeter* work) const noexcept {
+  return ParametricView(*this, work);
 }
 
 }  // namespace asperity

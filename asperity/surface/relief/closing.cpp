@@ -187,7 +187,8 @@ class Closer {
   /// Moves a contact to the surface's point that is nearest to the centre, as far as the surface leads there.
   void follow(Contact& contact, const Vec3& centre) const {
     ReliefPoint spot = surface_.point(contact.place.frame, contact.place.u, contact.place.v);
-    descend(surface_, contact.place, spot, 1.0, {.point = centre, .may_leave = false});
+    WorkCount count;
+    descend(surface_, contact.place, spot, 1.0, {.point = centre, .may_leave = false}, count);
     contact.point = spot.point;
     const Vec3 offset = centre - contact.point;
     contact.distance = offset.norm();

@@ -17,6 +17,12 @@ bool ReliefSurface::in_band(const ReliefFrame& frame, double u, double v) const 
   return false;
 }
 
+std::uint32_t ReliefSurface::partners_at(const ReliefFrame& frame, double u, double v) const noexcept {
+  std::uint32_t count = 0;
+  for_each_partner(frame, u, v, [&](std::uint32_t) { ++count; });
+  return count;
+}
+
 HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {
   if (!in_band(frame, u, v)) {
     HeightJet jet = coat_.jet(frame.coat, u, v);

@@ -103,27 +103,72 @@ struct PatchHit {
   double v = 0.0;
 };
 
+/// A segment in a face's own plane frame, cut down to where it is within the hull of all of the face's relief.
+struct HullPart {
+  double from = 0.0;
+  double to = 1.0;
+  Vec3 start = Vec3::Zero();  ///< of the motion, in the plane's frame
+  Vec3 rate = Vec3::Zero();
+};
+
+/// False where it is nowhere within the hull before `limit`: no more of the face is looked at then.
+bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellPrism& prism, const Segment& segment,
+                  double limit, HullPart& part) noexcept {
+  const PlaneFrame plane(prism);
+  part = {0.0, std::min(1.0, limit), plane.turned(segment.from - prism.corner),
+          plane.turned(segment.to - segment.from)};
+  const Vec3 turned[3] = {plane.turned(prism.direction), plane.turned(prism.direction + prism.turn_u),
+                          plane.turned(prism.direction + prism.turn_v)};
+  const HeightRange range = surface.range(face);
+  // u, v, 1 - u - v and the height over the plane, at six points: exact bounds of their hull.
+  double low[4] = {infinity, infinity, infinity, infinity};
+  double high[4] = {-infinity, -infinity, -infinity, -infinity};
+  for (int corner = 0; corner < 3; ++corner) {
+    for (const double height : {range.lowest, range.highest}) {
+      const double u = (corner == 1 ? 1.0 : 0.0) + height * turned[corner].x();
+      const double v = (corner == 2 ? 1.0 : 0.0) + height * turned[corner].y();
+      const double values[4] = {u, v, 1.0 - u - v, height * turned[corner].z()};
+      for (int k = 0; k < 4; ++k) {
+        low[k] = std::min(low[k], values[k]);
+        high[k] = std::max(high[k], values[k]);
+      }
+    }
+  }
+  // Room for the rounding of all this: far below a skin.
+  const Vec3& start = part.start;
+  const Vec3& rate = part.rate;
+  const double room_plane = 1e-9 + 1e-12 * (std::abs(start.x()) + std::abs(start.y()));
+  const double room_height = 1e-3 * surface.skin() + 1e-14 * std::abs(start.z());
+  return cut(start.x(), rate.x(), low[0] - room_plane, high[0] + room_plane, part.from, part.to) &&
+         cut(start.y(), rate.y(), low[1] - room_plane, high[1] + room_plane, part.from, part.to) &&
+         cut(1.0 - start.x() - start.y(), -rate.x() - rate.y(), low[2] - room_plane, high[2] + room_plane, part.from,
+             part.to) &&
+         cut(start.z(), rate.z(), low[3] - room_height, high[3] + room_height, part.from, part.to);
+}
+
 /// Searches one triangle for the first place where a segment meets its relief. A crossing lies on the curve that the
 /// segment is in the shell's coordinates, so that the search is along that curve alone: pieces of it over which the
 /// relief is bounded away from it are passed over, others halved.
 class PatchRay {
  public:
-  PatchRay(const ReliefSurface& surface, const ReliefFrame& frame, const Segment& segment, Sides sides) noexcept
+  PatchRay(const ReliefSurface& surface, const ReliefFrame& frame, const Segment& segment, Sides sides,
+           const HullPart& part) noexcept
       : surface_(surface),
         frame_(frame),
         segment_(segment),
         way_(segment.to - segment.from),
         sides_(sides),
-        leaf_(leaf_level(frame)) {}
+        leaf_(leaf_level(frame)),
+        part_(part),
+        range_(surface.range(frame.face)) {}
 
-  PatchHit first(double limit) noexcept {
-    double from = 0.0;
-    double to = std::min(1.0, limit);
+  [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
+
+  PatchHit first() noexcept {
     PatchHit best;
-    if (!clip(from, to)) return {};
     Piece stack[deepest + 2];
     int top = 0;
-    stack[top++] = {at(from, guess(from)), at(to, guess(to)), 0};
+    stack[top++] = {at(part_.from, guess(part_.from)), at(part_.to, guess(part_.to)), 0};
     while (top > 0) {
       const Piece piece = stack[--top];
       if (passed_over(piece)) continue;
@@ -153,42 +198,10 @@ class PatchRay {
     int level = 0;
   };
 
-  /// To where the segment is within the hull of all of the face's relief.
-  bool clip(double& from, double& to) noexcept {
-    const ShellPrism& prism = frame_.prism;
-    const PlaneFrame plane(prism);
-    start_ = plane.turned(segment_.from - prism.corner);
-    rate_ = plane.turned(way_);
-    const Vec3 turned[3] = {plane.turned(prism.direction), plane.turned(prism.direction + prism.turn_u),
-                            plane.turned(prism.direction + prism.turn_v)};
-    const HeightRange range = surface_.range(frame_.face);
-    // u, v, 1 - u - v and the height over the plane, at six points: exact bounds of their hull.
-    double low[4] = {infinity, infinity, infinity, infinity};
-    double high[4] = {-infinity, -infinity, -infinity, -infinity};
-    for (int corner = 0; corner < 3; ++corner) {
-      for (const double height : {range.lowest, range.highest}) {
-        const double u = (corner == 1 ? 1.0 : 0.0) + height * turned[corner].x();
-        const double v = (corner == 2 ? 1.0 : 0.0) + height * turned[corner].y();
-        const double values[4] = {u, v, 1.0 - u - v, height * turned[corner].z()};
-        for (int k = 0; k < 4; ++k) {
-          low[k] = std::min(low[k], values[k]);
-          high[k] = std::max(high[k], values[k]);
-        }
-      }
-    }
-    // Room for the rounding of all this: far below a skin.
-    const double room_plane = 1e-9 + 1e-12 * (std::abs(start_.x()) + std::abs(start_.y()));
-    const double room_height = 1e-3 * surface_.skin() + 1e-14 * std::abs(start_.z());
-    return cut(start_.x(), rate_.x(), low[0] - room_plane, high[0] + room_plane, from, to) &&
-           cut(start_.y(), rate_.y(), low[1] - room_plane, high[1] + room_plane, from, to) &&
-           cut(1.0 - start_.x() - start_.y(), -rate_.x() - rate_.y(), low[2] - room_plane, high[2] + room_plane, from,
-               to) &&
-           cut(start_.z(), rate_.z(), low[3] - room_height, high[3] + room_height, from, to);
-  }
-
   /// As if directions were the plane's normal.
   [[nodiscard]] ShellPlace guess(double t) const noexcept {
-    return {start_.x() + t * rate_.x(), start_.y() + t * rate_.y(), start_.z() + t * rate_.z()};
+    const Vec3 there = part_.start + t * part_.rate;
+    return {there.x(), there.y(), there.z()};
   }
 
   Moment at(double t, const ShellPlace& near) const noexcept {
@@ -212,6 +225,7 @@ class PatchRay {
 
   void evaluate(Moment& moment) const noexcept {
     if (moment.value < infinity || !moment.reached) return;
+    count_.evaluations += surface_.heights_at(frame_, moment.place.u, moment.place.v);
     moment.value = moment.place.height - surface_.height(frame_, moment.place.u, moment.place.v).height;
     // A motion that starts on the surface starts outside it, whatever rounding says.
     if (moment.t == 0.0 && moment.value < 0.0 && moment.value >= -surface_.skin()) moment.value = 0.0;
@@ -232,6 +246,11 @@ class PatchRay {
     if (std::max(a.u, b.u) < -beside || std::max(a.v, b.v) < -beside ||
         std::min(a.u + a.v, b.u + b.v) > 1.0 + 2.0 * beside)
       return true;
+    // Over all that the face has anywhere, or below: a look at the part itself is dear.
+    if (std::min(a.height, b.height) - bend.height > range_.highest) return true;
+    if (std::max(a.height, b.height) + bend.height < range_.lowest - (piece.from.t == 0.0 ? surface_.skin() : 0.0))
+      return true;
+    ++count_.bounds;
     const HeightForm form = surface_.form(frame_, FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v}));
     // Height over the plane that the relief keeps to, at both ends.
     const double half = 0.5 * (form.u * (b.u - a.u) + form.v * (b.v - a.v));
@@ -417,8 +436,9 @@ class PatchRay {
   Vec3 way_;
   Sides sides_;
   int leaf_;
-  Vec3 start_ = Vec3::Zero();  ///< of the motion in the plane's frame
-  Vec3 rate_ = Vec3::Zero();
+  HullPart part_;
+  HeightRange range_;  ///< of the heights over all of the face
+  mutable WorkCount count_{0, 0, 1};
 };
 
 /// Searches triangles for the point of their relief that is nearest to a point.
@@ -431,12 +451,14 @@ class ReliefNearestSearch {
   [[nodiscard]] bool found() const noexcept { return place_.frame.face != no_index; }
   [[nodiscard]] const ReliefPlace& place() const noexcept { return place_; }
   [[nodiscard]] const ReliefPoint& spot() const noexcept { return spot_; }
+  [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
 
   /// Starts a descent from a place, and keeps where it ends if that is nearer than all before.
   void descend_from(const ReliefPlace& place) noexcept {
     ReliefPlace at = place;
     ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
-    const DescentEnd end = descend(surface_, at, spot, 1.0, {.point = p_, .may_leave = false, .exactly = true});
+    const Goal goal{.point = p_, .may_leave = false, .exactly = true};
+    const DescentEnd end = descend(surface_, at, spot, 1.0, goal, count_);
     const double now = (spot.point - p_).norm();
     if (now > distance_ || (now == distance_ && found())) return;
     distance_ = now;
@@ -447,6 +469,7 @@ class ReliefNearestSearch {
 
   void visit(std::uint32_t face) noexcept {
     ReliefPlace here;
+    ++count_.frames;
     here.frame = found() && place_.frame.face == face ? place_.frame : surface_.frame(face, moment_);
     const double small = std::ldexp(1.0, -leaf_level(here.frame));
     Part stack[stack_capacity];
@@ -463,6 +486,7 @@ class ReliefNearestSearch {
         const Vec2 middle = within_face((part.corner[0] + part.corner[1] + part.corner[2]) / 3.0);
         here.u = middle.x();
         here.v = middle.y();
+        ++count_.evaluations;
         const double now = (surface_.point(here.frame, here.u, here.v).point - p_).norm();
         // Before anything is found every leaf that may reach into the bound is tried; after that, a leaf this small
         // whose middle is no nearer lies on the way of a descent that was made already.
@@ -536,7 +560,8 @@ class ReliefNearestSearch {
   }
 
   /// Sets the part's key, which no point of its relief is nearer than.
-  void measure(const ReliefFrame& frame, Part& part) const noexcept {
+  void measure(const ReliefFrame& frame, Part& part) noexcept {
+    ++count_.bounds;
     const ReliefBound bound = surface_.bound(frame, FacePart::triangle(part.corner[0], part.corner[1], part.corner[2]));
     const double square =
         closest_point_on_triangle(p_, bound.corner[0], bound.corner[1], bound.corner[2]).squared_distance;
@@ -554,6 +579,7 @@ class ReliefNearestSearch {
   ReliefPlace place_;
   ReliefPoint spot_;
   bool rests_ = false;  ///< at a local minimum
+  WorkCount count_;
 };
 
 Foot foot_at(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& p) noexcept {
@@ -575,11 +601,17 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
   const Vec3 way = motion.to - motion.from;
   if (!(way.squaredNorm() > 0.0)) return best;
   ReliefPlace place;
+  WorkCount count;
   // Nearly all motions are far shorter than a face: the neighbourhood decides.
   surface_->base().index().for_each_along(motion, surface_->boxes(), [&](std::uint32_t face) {
     if (skip(face)) return best.t;
+    HullPart part;
+    if (!clip_to_hull(*surface_, face, surface_->shell().prism(surface_->base().mesh(), face), motion, best.t, part))
+      return best.t;
     const ReliefFrame here = surface_->frame(face, moment_);
-    const PatchHit hit = PatchRay(*surface_, here, motion, sides).first(best.t);
+    PatchRay ray(*surface_, here, motion, sides, part);
+    const PatchHit hit = ray.first();
+    count += ray.count();
     if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
       best.hit = true;
       best.t = hit.t;
@@ -588,6 +620,7 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
     }
     return best.t;
   });
+  cache_->took(count);
   if (!best.hit) return best;
   const ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
   best.contact = foot_at(place, spot, motion.from);
@@ -628,6 +661,7 @@ Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const 
     search.visit(face);
     return search.distance();
   });
+  cache_->took(search.count());
   if (!search.found()) return {};
   cache_->relief = {search.place(), search.spot(), true};
   return foot_at(search.place(), search.spot(), p);

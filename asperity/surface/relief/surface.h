@@ -95,6 +95,10 @@ class ReliefSurface {
   }
   /// Height as rendered over a place of the frame's triangle. [servo]
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// Heights that are asked for there: the face's own and those of the faces that may have a say in it. [servo]
+  [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
+    return frame.stitched && in_band(frame, u, v) ? 1 + partners_at(frame, u, v) : 1;
+  }
   /// The displaced surface over it. [servo]
   [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept {
     ReliefPoint spot;
@@ -172,6 +176,7 @@ class ReliefSurface {
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  [[nodiscard]] std::uint32_t partners_at(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightForm stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept;

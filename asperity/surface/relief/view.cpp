@@ -28,6 +28,8 @@ struct ReliefFaces {
 
   const ReliefSurface& surface;
   CoatMoment moment;
+  WorkCount& count;
+  std::uint32_t before = count.evaluations;
   bool exactly = false;
   double rest =
       (exactly ? exact_rest : 1.0) * std::min(relief_rest_of_grain * surface.grain(), rest_of_edge* mesh().mean_edge());
@@ -36,8 +38,10 @@ struct ReliefFaces {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface.base().mesh(); }
   [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept { return surface.frame(face, moment); }
   [[nodiscard]] ReliefPoint evaluate(const ReliefFrame& frame, double u, double v) const noexcept {
+    count.evaluations += surface.heights_at(frame, u, v);
     return surface.point(frame, u, v);
   }
+  [[nodiscard]] std::uint32_t work() const noexcept { return count.evaluations - before; }
   [[nodiscard]] static WalkForms forms(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& goal) noexcept {
     const ShellPrism& prism = place.frame.prism;
     const Vec3 rest = spot.point - goal;
@@ -109,18 +113,23 @@ Vec3 shared_place(const TriangleMesh& mesh, const Place& place, const Border& bo
 
 }  // namespace
 
-DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
-                   const Goal& goal) noexcept {
-  const ReliefFaces faces{surface, place.frame.coat.moment, goal.exactly};
+DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side, const Goal& goal,
+                   WorkCount& count) noexcept {
+  const ReliefFaces faces{surface, place.frame.coat.moment, count, count.evaluations, goal.exactly};
   FaceChart<ReliefFaces> chart(faces, place, spot);
-  return Walk<FaceChart<ReliefFaces>>(chart, goal, side).run();
+  Walk<FaceChart<ReliefFaces>> walk(chart, goal, side);
+  const DescentEnd end = walk.run();
+  count.frames += chart.frames();
+  return end;
 }
 
 DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal) const noexcept {
   ReliefCache& cache = hold(place.element);
   cache.place.u = place.at[1];
   cache.place.v = place.at[2];
-  const DescentEnd end = asperity::descend(*surface_, cache.place, spot, place.side(), goal);
+  WorkCount count;
+  const DescentEnd end = asperity::descend(*surface_, cache.place, spot, place.side(), goal, count);
+  cache_->took(count);
   cache.spot = spot;
   cache.evaluated = true;
   place.element = cache.place.frame.face;

@@ -6,9 +6,9 @@
 namespace asperity {
 
 /// Leads a place of a relief, touched from `side`, along it, across edges and round vertices; `spot` is the surface at
-/// `place`, before and after. [servo]
-DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side,
-                   const Goal& goal) noexcept;
+/// `place`, before and after. What it took is added to `count`. [servo]
+DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side, const Goal& goal,
+                   WorkCount& count) noexcept;
 
 /// A relief at one moment of its coat: see SurfaceView. [servo]
 class ReliefView {

@@ -1,0 +1,238 @@
+// A tick's budget: what it looks at is bounded and counted, what is left is gone on with, and nothing is passed or felt
+// twice.
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "asperity/geometry/generators.h"
+#include "tests/field/volumes.h"
+#include "tests/render/fixtures.h"
+#include "tests/surface/custom_fields.h"
+#include "tests/surface/reliefs.h"
+
+namespace asperity::budget_test {
+namespace {
+
+using namespace test;
+
+constexpr double size = 0.02;  // m, of every body
+constexpr std::uint32_t small_budget = SceneSettings::least_budget;
+
+Instance instance_of(Surface surface) {
+  Instance instance;
+  instance.name = "test";
+  instance.surface = std::move(surface);
+  instance.material.stiffness = stiffness;
+  return instance;
+}
+
+std::shared_ptr<const ReliefSurface> rough_ball() {
+  static const auto relief =
+      relief_on(mesh_of(icosphere(2, size)), {tiled(wavy_map(4e-4, 64), 0.01)}, CoatSettings{Mapping::triplanar});
+  return relief;
+}
+
+Surface rough_formula() {
+  FeatureSpec waves;
+  waves.kind = FeatureKind::grating;
+  waves.amplitude = 2e-4;
+  waves.wavelength = Vec2(2.0 * std::numbers::pi * 0.7 * size / 40.0, 0.0);
+  ParametricSettings settings;
+  settings.shape = ParametricShape::torus;
+  settings.radius = 0.7 * size;
+  settings.tube = 0.35 * size;
+  settings.tile = Vec2(settings.radius, settings.tube);
+  settings.features = {must(SurfaceFeature::build(waves))};
+  return std::make_shared<const ParametricSurface>(must(ParametricSurface::build(settings)));
+}
+
+/// One body of a kind, or several together.
+struct Kind {
+  const char* name;
+  bool walks_far;  ///< a tick of a fast probe takes more than the small budget
+};
+constexpr Kind kinds[] = {{"relief", true},      {"relief beside a wall", true},
+                          {"two reliefs", true}, {"volume", true},
+                          {"formula", true},     {"custom", true},
+                          {"mesh", true}};
+
+Scene scene_of_kind(std::size_t kind, std::uint32_t budget, double still = 0.0, double sliding = 0.0) {
+  std::vector<Instance> instances;
+  const auto wall = [] {
+    return instance_of(std::make_shared<const MeshSurface>(
+        TriangleIndex::build(must(TriangleMesh::build(plane_grid(0.2, 0.2, 4, 4))))));
+  };
+  switch (kind) {
+    case 0: instances = {instance_of(rough_ball())}; break;
+    case 1: instances = {instance_of(rough_ball()), wall()}; break;
+    case 2:
+      instances = {instance_of(rough_ball()), instance_of(rough_ball())};
+      instances[1].world_from_object.position = Vec3(0.7 * size, 0.2 * size, 0.0);
+      break;
+    case 3:
+      instances = {instance_of(std::make_shared<const IsoSurface>(
+          must(IsoSurface::build(sphere_field(64, CellReconstruction::smooth), size, Inside::low))))};
+      break;
+    case 4: instances = {instance_of(rough_formula())}; break;
+    case 5:
+      instances = {instance_of(std::make_shared<const CustomSurface>(must(CustomSurface::build(SmoothBall{}))))};
+      break;
+    default:
+      instances = {instance_of(
+          std::make_shared<const MeshSurface>(TriangleIndex::build(must(TriangleMesh::build(icosphere(5, size))))))};
+  }
+  for (Instance& instance : instances) {
+    instance.material.static_friction = still;
+    instance.material.dynamic_friction = sliding;
+  }
+  SceneSettings settings;
+  settings.budget = budget;
+  return must(Scene::build(std::move(instances), settings));
+}
+
+/// Fast around and through a body, now and then held still.
+std::vector<Vec3> fast_path(Rng& rng, std::size_t ticks) {
+  std::vector<Vec3> path;
+  Vec3 p(0.0, 0.0, 2.0 * size);
+  while (path.size() < ticks) {
+    const Vec3 goal = 1.1 * size * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    const auto count = 2 + rng.below(6);
+    const Vec3 stride = (goal - p) / static_cast<double>(count);
+    for (std::uint64_t i = 0; i < count; ++i) path.push_back(p += stride);
+    for (std::uint64_t i = rng.below(3) * 10; i > 0; --i) path.push_back(p);
+  }
+  path.resize(ticks);
+  return path;
+}
+
+class Budget : public ::testing::TestWithParam<std::size_t> {};
+std::string name_of(const ::testing::TestParamInfo<std::size_t>& kind) {
+  std::string name = kinds[kind.param].name;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(Kinds, Budget, ::testing::Range<std::size_t>(0, std::size(kinds)), name_of);
+
+TEST_P(Budget, WhatDoesNotFitIsToldAndGoneOnWith) {
+  Rng rng(11);
+  std::size_t open = 0;
+  for (const double still : {0.0, 0.4}) {
+    const Scene scene = scene_of_kind(GetParam(), small_budget, still, 0.7 * still);
+    const Scene unlimited = scene_of_kind(GetParam(), 0, still, 0.7 * still);
+    ProxyState state;
+    ProxyCache cache;
+    const auto path = fast_path(rng, 1500);
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const ForceSample felt = step(scene, state, cache, probe_at(path[i]), tick);
+      ASSERT_EQ(felt.flags.has(TickFlag::work_left), state.open_ticks > 0);
+      if (!felt.flags.has(TickFlag::work_left)) continue;
+      ++open;
+      // As much as it had; what was left of it went into the last query.
+      EXPECT_GE(cache.work().done().sum(), small_budget) << i;
+      // Held still it comes to rest, in about as many ticks as the work takes, and where nothing draws it on.
+      ProxyState rest = state;
+      ProxyState all = state;
+      ProxyCache whole;
+      step(unlimited, all, whole, probe_at(path[i]), tick);
+      const std::uint32_t ticks = 4 + 3 * whole.work().done().sum() / small_budget;
+      std::uint32_t taken = 0;
+      ForceSample later = felt;
+      for (; taken < ticks && later.flags.has(TickFlag::work_left); ++taken)
+        later = step(scene, rest, cache, probe_at(path[i]), tick);
+      ASSERT_FALSE(later.flags.has(TickFlag::work_left)) << i << " after " << taken;
+      // Nothing is left to do; under friction a long slip's cone goes by where it began, and is found anew.
+      if (still > 0.0) continue;
+      const double before = (rest.proxy - path[i]).norm();
+      step(scene, rest, cache, probe_at(path[i]), tick);
+      EXPECT_NEAR((rest.proxy - path[i]).norm(), before, 1e-3 * before + 1e-6) << i;
+    }
+  }
+  EXPECT_EQ(open > 0, kinds[GetParam()].walks_far) << open;
+}
+
+TEST_P(Budget, ATickGoesOverByOneQueryOrTwo) {
+  Rng rng(12);
+  const auto path = fast_path(rng, 3000);
+  const auto dearest = [&](std::uint32_t budget) {
+    const Scene scene = scene_of_kind(GetParam(), budget);
+    ProxyState state;
+    ProxyCache cache;
+    std::uint32_t most = 0;
+    for (const Vec3& p : path) {
+      step(scene, state, cache, probe_at(p), tick);
+      most = std::max(most, cache.work().done().sum());
+    }
+    return most;
+  };
+  const std::uint32_t all = dearest(0);
+  const std::uint32_t kept = dearest(small_budget);
+  RecordProperty("unlimited", static_cast<int>(all));
+  RecordProperty("kept", static_cast<int>(kept));
+  std::printf("dearest tick: %u, of a budget of %u: %u\n", all, small_budget, kept);
+  EXPECT_LE(kept, std::max(all, small_budget));
+  EXPECT_LE(kept, 8 * small_budget);
+}
+
+TEST_P(Budget, ReplaysAreEqualWhateverCachesHold) {
+  Rng rng(13);
+  const Scene scene = scene_of_kind(GetParam(), small_budget, 0.3, 0.2);
+  ProxyState warm;
+  ProxyState cold;
+  ProxyCache remembered;
+  for (const Vec3& p : fast_path(rng, 1500)) {
+    ProxyCache empty;
+    const ForceSample one = step(scene, warm, remembered, probe_at(p), tick);
+    const ForceSample other = step(scene, cold, empty, probe_at(p), tick);
+    ASSERT_EQ(std::memcmp(&one.wrench, &other.wrench, sizeof(one.wrench)), 0);
+    ASSERT_EQ(one.proxy, other.proxy);
+    ASSERT_EQ(one.flags.bits(), other.flags.bits());
+    ASSERT_EQ(remembered.work().done().sum(), empty.work().done().sum());
+  }
+}
+
+TEST_P(Budget, ItMakesNoJumpLarger) {
+  Rng rng(14);
+  const auto path = fast_path(rng, 3000);
+  double fastest = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) fastest = std::max(fastest, (path[i] - path[i - 1]).norm());
+  const double without = largest_jump(slide(scene_of_kind(GetParam(), 0), path));
+  const double with = largest_jump(slide(scene_of_kind(GetParam(), small_budget), path));
+  EXPECT_LE(with, without + stiffness * fastest);
+}
+
+RC_GTEST_PROP(BudgetInvariants, the_proxy_never_moves_away_from_the_probe, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const std::size_t kind = rng.below(std::size(kinds));
+  const double still = rng.below(2) == 0 ? 0.0 : rng.uniform(0.0, 1.0);
+  const Scene scene =
+      scene_of_kind(kind, small_budget + static_cast<std::uint32_t>(rng.below(400)), still, still * rng.uniform());
+  ProxyState state;
+  for (const Vec3& p : fast_path(rng, 200)) {
+    const Vec3 before = state.proxy;
+    const bool first = state.epoch == 0;
+    touch(scene, state, p);
+    RC_ASSERT(first || (state.proxy - p).norm() <= (before - p).norm() + 1e-6);
+  }
+}
+
+TEST(BudgetSettings, ABallAndAPointHaveTheirOwn) {
+  EXPECT_EQ(must(Scene::build({instance_of(rough_ball())}, 0.0)).budget(), SceneSettings::budget_for(0.0));
+  EXPECT_EQ(must(Scene::build({instance_of(rough_ball())}, 1e-3)).budget(), 0U);
+  SceneSettings settings;
+  settings.budget = 7;
+  const auto refused = Scene::build({instance_of(rough_ball())}, settings);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().place, "budget");
+  EXPECT_NE(refused.error().message().find("100 evaluations or more, or 0"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace asperity::budget_test
