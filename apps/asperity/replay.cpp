@@ -87,6 +87,14 @@ Result<Comparison> play(const Trace& trace, const Experiment& experiment, const 
   return comparison;
 }
 
+/// The scene of a trace: one that says nothing of a budget is of a time when ticks had none.
+std::string scene_of(const Trace& trace) {
+  Json scene = Json::parse(trace.metadata.scene, nullptr, false);
+  if (!scene.is_object() || scene.contains("budget")) return trace.metadata.scene;
+  scene["budget"] = 0;
+  return scene.dump();
+}
+
 Result<int> replay(const std::string& path, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Trace trace, read_trace(path));
@@ -101,7 +109,7 @@ Result<int> replay(const std::string& path, const Console& console) {
     const std::string reason = trace.damage.empty() ? std::string() : ": " + trace.damage;
     return Error{ErrorCode::mismatch, "holds no whole tick" + reason, path, {}, "a trace with at least one tick"};
   }
-  ASPERITY_TRY(const Experiment experiment, parse_experiment(trace.metadata.scene, ".", path + " (scene)", progress));
+  ASPERITY_TRY(const Experiment experiment, parse_experiment(scene_of(trace), ".", path + " (scene)", progress));
   ASPERITY_TRY(const Comparison comparison, play(trace, experiment, progress));
   const bool equal = comparison.different == 0;
   if (console.json) {

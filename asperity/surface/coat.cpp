@@ -367,6 +367,23 @@ HeightJet Coat::layered_jet(const CoatFrame& frame, double u, double v) const no
   return sum;
 }
 
+double Coat::own_height(const CoatFrame& frame, double u, double v) const noexcept {
+  if (!frame.triplanar) return frame.maps->height(frame.st + u * frame.st_u + v * frame.st_v, frame.level);
+  const Vec3 point = place_at(frame, u, v);
+  const Vec3 normal = frame.normal + u * frame.normal_u + v * frame.normal_v;
+  const Vec2& tile = frame.maps->tile();
+  const double least = triplanar_threshold * normal.squaredNorm();
+  double sum = 0.0;
+  double weight = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double q = normal[axis] * normal[axis] - least;
+    if (q <= 0.0) continue;
+    sum += q * q * frame.maps->height(seen_along(axis, point, tile), frame.level);
+    weight += q * q;
+  }
+  return sum / std::max(weight, std::numeric_limits<double>::min());
+}
+
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
   if (frame.triplanar) return triplanar_jet(frame, u, v);
   const HeightCurvature map = frame.maps->curvature(frame.st + u * frame.st_u + v * frame.st_v, frame.level);

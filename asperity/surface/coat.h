@@ -126,6 +126,10 @@ class Coat {
   [[nodiscard]] HeightJet jet(const CoatFrame& frame, double u, double v) const noexcept {
     return frame.layers.empty() ? own_jet(frame, u, v) : layered_jet(frame, u, v);
   }
+  /// That height alone (m), to within rounding. [servo]
+  [[nodiscard]] double height(const CoatFrame& frame, double u, double v) const noexcept {
+    return frame.layers.empty() ? own_height(frame, u, v) : layered_jet(frame, u, v).height;
+  }
   /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
   [[nodiscard]] HeightRange range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
   /// A plane that the face's own height keeps to over part of it: where the relief is smooth the error is of second
@@ -175,6 +179,7 @@ class Coat {
   [[nodiscard]] CoatSample sample_triplanar(const TriangleMesh& mesh, std::uint32_t face,
                                             const Vec3& barycentric) const noexcept;
 
+  [[nodiscard]] double own_height(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet own_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet layered_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;

