@@ -19,7 +19,7 @@ struct BvhSettings {
   bool plain_kernels = false;  ///< plain C++ in place of AVX2: the oracle
 };
 
-/// Takes a pair of triangles.
+/// Takes a pair of triangles; may be called from several threads at a time.
 using MeetingVisit = std::function<void(std::uint32_t, std::uint32_t)>;
 
 /// Where refitting finds the corners of each leaf's triangles in a row, and room for what it measures. [build]
@@ -85,8 +85,8 @@ class Bvh {
 
   /// Boxes, one a triangle (m), ready to be searched; never too small. [build]
   [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
-  /// Calls visit(one, other) once for every pair of triangles whose boxes meet, and perhaps for some that miss each
-  /// other by a rounding. [build]
+  /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet, and perhaps for
+  /// some that miss each other by a rounding; in no order, and from several threads at a time. [build]
   void for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const;
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>

@@ -1,9 +1,15 @@
 // Which of many boxes, one a triangle, meet: the hierarchy joined with itself.
 
+#include <algorithm>
 #include <cstring>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/geometry/bvh.h"
 #include "asperity/geometry/triangle_index.h"
+
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
 
 namespace asperity {
 
@@ -11,10 +17,27 @@ namespace {
 
 #define ASPERITY_INLINE [[gnu::always_inline]] inline
 
-/// Which of the eight boxes meet `box`: not zero for those that do. Answers whether any does.
-ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const FloatBox& box, std::int32_t (&met)[8]) {
-  using Floats = float __attribute__((vector_size(32)));
-  using Ints = std::int32_t __attribute__((vector_size(32)));
+// As many as make starting a thread pay.
+constexpr std::size_t leaves_a_share = 128;
+
+using Floats = float __attribute__((vector_size(32)));
+using Ints = std::int32_t __attribute__((vector_size(32)));
+
+/// The sign bits of eight numbers.
+ASPERITY_INLINE unsigned bits_of(const Ints& all) {
+#if defined(__x86_64__)
+  __m128 half[2];
+  std::memcpy(half, &all, sizeof(half));
+  return static_cast<unsigned>(_mm_movemask_ps(half[0])) | static_cast<unsigned>(_mm_movemask_ps(half[1])) << 4U;
+#else
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 8; ++i) bits |= all[i] < 0 ? 1U << i : 0U;
+  return bits;
+#endif
+}
+
+/// Which of the eight boxes meet `box`, a bit each.
+ASPERITY_INLINE unsigned meeting(const BoxesOf8& boxes, const FloatBox& box) {
   Ints all = Ints{} - 1;
   for (int axis = 0; axis < 3; ++axis) {
     Floats lower;
@@ -23,10 +46,7 @@ ASPERITY_INLINE bool meeting(const BoxesOf8& boxes, const FloatBox& box, std::in
     std::memcpy(&upper, boxes.upper[axis], sizeof(upper));
     all &= (lower <= box.upper[axis]) & (upper >= box.lower[axis]);
   }
-  std::memcpy(met, &all, sizeof(met));
-  std::uint64_t words[4];
-  std::memcpy(words, &all, sizeof(words));
-  return (words[0] | words[1] | words[2] | words[3]) != 0;
+  return bits_of(all);
 }
 
 FloatBox around(const BoxesOf8& boxes) {
@@ -44,82 +64,135 @@ FloatBox around(const BoxesOf8& boxes) {
 
 class Bvh::Join {
  public:
-  Join(const Bvh& bvh, const FaceBoxes& boxes) : bvh_(bvh), leaves_(boxes.leaves), nodes_(boxes.nodes) {}
+  Join(const Bvh& bvh, const FaceBoxes& boxes)
+      : bvh_(bvh), leaves_(boxes.leaves), nodes_(boxes.nodes), corners_(boxes.leaves.size()) {
+    parallel_for(corners_.size(), {.grain = leaves_a_share}, [&](std::size_t leaf) {
+      for (std::size_t i = 0; i < 8; ++i) {
+        const std::uint32_t face = bvh.leaves_[leaf].face[i];
+        for (std::size_t k = 0; k < 3; ++k)
+          corners_[leaf].vertex[k][i] = face == no_index ? no_index : bvh.mesh_->triangles()[face][k];
+      }
+    });
+    // Each leaf is joined with those that come after it: a subtree whose leaves all come before has nothing to offer.
+    last_leaf_.resize(nodes_.size());
+    for (std::size_t node = nodes_.size(); node-- > 0;) {
+      std::uint32_t last = 0;
+      for (const std::uint32_t child : bvh.nodes_[node].child) {
+        if (child != empty_child)
+          last = std::max(last, (child & leaf_bit) != 0 ? child & ~leaf_bit : last_leaf_[child]);
+      }
+      last_leaf_[node] = last;
+    }
+  }
 
-  ASPERITY_INLINE void run(const MeetingVisit& visit) const {
-    for (std::uint32_t leaf = 0; leaf < leaves_.size(); ++leaf) {
-      const FloatBox whole = around(leaves_[leaf]);
-      std::uint32_t stack[stack_capacity];
-      int top = 0;
-      stack[top++] = 0;
-      while (top > 0) {
-        const std::uint32_t node = stack[--top];
-        std::int32_t met[8];
-        if (!meeting(nodes_[node], whole, met)) continue;
-        for (std::size_t i = 0; i < 8; ++i) {
-          if (met[i] == 0) continue;
-          const std::uint32_t child = bvh_.nodes_[node].child[i];
-          if ((child & leaf_bit) == 0) {
-            stack[top++] = child;
-          } else if ((child & ~leaf_bit) >= leaf) {
-            join(leaf, child & ~leaf_bit, visit);
-          }
+  ASPERITY_INLINE void run(std::uint32_t leaf, const MeetingVisit& visit) const {
+    const FloatBox whole = around(leaves_[leaf]);
+    std::uint32_t stack[stack_capacity];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::uint32_t node = stack[--top];
+      for (unsigned met = meeting(nodes_[node], whole); met != 0; met &= met - 1) {
+        const auto i = static_cast<std::size_t>(__builtin_ctz(met));
+        const std::uint32_t child = bvh_.nodes_[node].child[i];
+        if ((child & leaf_bit) == 0) {
+          if (last_leaf_[child] >= leaf) stack[top++] = child;
+        } else if ((child & ~leaf_bit) >= leaf) {
+          join(leaf, child & ~leaf_bit, slot(nodes_[node], i), visit);
         }
       }
     }
   }
 #if defined(__x86_64__)
-  __attribute__((target("avx2"))) void run_avx2(const MeetingVisit& visit) const {
-    run(visit);
+  __attribute__((target("avx2"))) void run_avx2(std::uint32_t leaf, const MeetingVisit& visit) const {
+    run(leaf, visit);
   }
 #endif
 
  private:
-  ASPERITY_INLINE void join(std::uint32_t one, std::uint32_t other, const MeetingVisit& visit) const {
-    const BoxesOf8& boxes = leaves_[one];
-    for (std::size_t i = 0; i < 8; ++i) {
-      const std::uint32_t face = bvh_.leaves_[one].face[i];
-      if (face == no_index) continue;
-      const FloatBox box{{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
-                         {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
-      std::int32_t met[8];
-      if (!meeting(leaves_[other], box, met)) continue;
-      for (std::size_t j = one == other ? i + 1 : 0; j < 8; ++j) {
-        if (met[j] != 0) visit(face, bvh_.leaves_[other].face[j]);
-      }
+  ASPERITY_INLINE static FloatBox slot(const BoxesOf8& boxes, std::size_t i) {
+    return {{boxes.lower[0][i], boxes.lower[1][i], boxes.lower[2][i]},
+            {boxes.upper[0][i], boxes.upper[1][i], boxes.upper[2][i]}};
+  }
+
+  /// `whole`: around all boxes of the other leaf.
+  ASPERITY_INLINE void join(std::uint32_t one, std::uint32_t other, const FloatBox& whole,
+                            const MeetingVisit& visit) const {
+    for (unsigned in_reach = meeting(leaves_[one], whole); in_reach != 0; in_reach &= in_reach - 1) {
+      const auto i = static_cast<unsigned>(__builtin_ctz(in_reach));
+      // Within one leaf, with those that come after.
+      unsigned met = meeting(leaves_[other], slot(leaves_[one], i)) & (one == other ? ~1U << i : ~0U);
+      if (met == 0) continue;
+      for (met &= ~neighbours(corners_[other], corners_[one], i); met != 0; met &= met - 1)
+        visit(bvh_.leaves_[one].face[i], bvh_.leaves_[other].face[__builtin_ctz(met)]);
     }
+  }
+
+  struct CornersOf8 {
+    alignas(32) std::uint32_t vertex[3][8];
+  };
+  /// Which of eight triangles have a vertex in common with the i-th of others, a bit each.
+  ASPERITY_INLINE static unsigned neighbours(const CornersOf8& corners, const CornersOf8& others, std::size_t i) {
+    Ints all{};
+    for (int k = 0; k < 3; ++k) {
+      Ints vertices;
+      std::memcpy(&vertices, corners.vertex[k], sizeof(vertices));
+      for (int j = 0; j < 3; ++j) all |= vertices == static_cast<std::int32_t>(others.vertex[j][i]);
+    }
+    return bits_of(all);
   }
 
   const Bvh& bvh_;
   const std::vector<BoxesOf8>& leaves_;
   const std::vector<BoxesOf8>& nodes_;
+  std::vector<CornersOf8> corners_;
+  std::vector<std::uint32_t> last_leaf_;  ///< below each node
 };
 
 FaceBoxes Bvh::enclosed(std::span<const Box> boxes) const {
-  // In the hierarchy's own units, grown by more than their rounding.
-  const auto local = [&](const Box& box) {
-    FloatBox grown;
-    to_local(box.lower, grown.lower);
-    to_local(box.upper, grown.upper);
+  // In the hierarchy's own units, grown by more than their rounding: four of a box's six numbers at a time.
+  using Four = double __attribute__((vector_size(32)));
+  using FourFloats = float __attribute__((vector_size(16)));
+  const auto local = [&](const double* from, const Four& origin, float sign) {
+    Four at;
+    std::memcpy(&at, from, sizeof(at));
+    const FourFloats x = __builtin_convertvector((at - origin) * per_scale_, FourFloats);
+    const FourFloats size = x < 0.0F ? -x : x;
+    return x + sign * (1e-6F * (1.0F + size));
+  };
+  static_assert(sizeof(Box) == 6 * sizeof(double));
+  const Four of_lower = {origin_.x(), origin_.y(), origin_.z(), 0.0};
+  const Four of_upper = {0.0, origin_.x(), origin_.y(), origin_.z()};
+  const auto set = [&](BoxesOf8& to, std::size_t slot, const Box& box) {
+    double numbers[6];
+    std::memcpy(numbers, &box, sizeof(box));
+    const FourFloats lower = local(numbers, of_lower, -1.0F);
+    const FourFloats upper = local(numbers + 2, of_upper, 1.0F);
     for (int axis = 0; axis < 3; ++axis) {
-      grown.lower[axis] -= 1e-6F * (1.0F + std::abs(grown.lower[axis]));
-      grown.upper[axis] += 1e-6F * (1.0F + std::abs(grown.upper[axis]));
+      to.lower[axis][slot] = lower[axis];
+      to.upper[axis][slot] = upper[axis + 1];
     }
-    return grown;
   };
   FaceBoxes all{std::vector<BoxesOf8>(leaves_.size()), std::vector<BoxesOf8>(nodes_.size())};
-  for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
+  std::vector<FloatBox> whole(leaves_.size());
+  parallel_for(leaves_.size(), {.grain = leaves_a_share}, [&](std::size_t leaf) {
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint32_t face = leaves_[leaf].face[i];
-      all.leaves[leaf].set(i, face == no_index ? FloatBox{} : local(boxes[face]));
+      if (face == no_index) {
+        all.leaves[leaf].set(i, FloatBox{});
+      } else {
+        set(all.leaves[leaf], i, boxes[face]);
+      }
     }
-  }
+    whole[leaf] = around(all.leaves[leaf]);
+  });
   for (std::size_t node = nodes_.size(); node-- > 0;) {
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint32_t child = nodes_[node].child[i];
       const bool empty = child == empty_child;
-      all.nodes[node].set(
-          i, empty ? FloatBox{} : around((child & leaf_bit) != 0 ? all.leaves[child & ~leaf_bit] : all.nodes[child]));
+      all.nodes[node].set(i, empty                     ? FloatBox{}
+                             : (child & leaf_bit) != 0 ? whole[child & ~leaf_bit]
+                                                       : around(all.nodes[child]));
     }
   }
   return all;
@@ -127,35 +200,45 @@ FaceBoxes Bvh::enclosed(std::span<const Box> boxes) const {
 
 void Bvh::for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const {
   const Join join(*this, boxes);
+  const auto leaves = boxes.leaves.size();
 #if defined(__x86_64__)
   static const bool wide = __builtin_cpu_supports("avx2");
-  if (wide) return join.run_avx2(visit);
+  if (wide) {
+    parallel_for(leaves, {.grain = leaves_a_share},
+                 [&](std::size_t leaf) { join.run_avx2(static_cast<std::uint32_t>(leaf), visit); });
+    return;
+  }
 #endif
-  join.run(visit);
+  parallel_for(leaves, {.grain = leaves_a_share},
+               [&](std::size_t leaf) { join.run(static_cast<std::uint32_t>(leaf), visit); });
 }
 
 FaceBoxes TriangleIndex::enclosed(std::span<const Box> boxes) const {
   FaceBoxes all;
   if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) all = bvh->enclosed(boxes);
-  for (std::uint32_t face = 0; face < boxes.size(); ++face) {
+  const ParallelSettings shares{.grain = 8 * leaves_a_share};
+  std::vector<double> farther(parallel_workers(boxes.size(), shares), 0.0);
+  parallel_for(boxes.size(), shares, [&](std::size_t face, unsigned worker) {
     Box own;
-    for (const Vec3& corner : mesh().corners(face)) own.include(corner);
-    all.farther =
-        std::max({all.farther, (own.lower - boxes[face].lower).maxCoeff(), (boxes[face].upper - own.upper).maxCoeff()});
-  }
+    for (const Vec3& corner : mesh().corners(static_cast<std::uint32_t>(face))) own.include(corner);
+    farther[worker] = std::max(
+        {farther[worker], (own.lower - boxes[face].lower).maxCoeff(), (boxes[face].upper - own.upper).maxCoeff()});
+  });
+  all.farther = *std::max_element(farther.begin(), farther.end());
   return all;
 }
 
-void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const {
-  const FaceBoxes all = enclosed(boxes);
-  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(all, visit);
+void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const FaceBoxes& enclosed,
+                                     const MeetingVisit& visit) const {
+  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(enclosed, visit);
   // The octree knows where the triangles are.
   std::vector<std::uint32_t> last_met(boxes.size(), no_index);
   for (std::uint32_t face = 0; face < boxes.size(); ++face) {
-    for_each_in_box(boxes[face].grown(all.farther), [&](std::uint32_t other) {
+    for_each_in_box(boxes[face].grown(enclosed.farther), [&](std::uint32_t other) {
       // A face that stands in several cells counts once.
       if (other <= face || last_met[other] == face) return;
       last_met[other] = face;
+      if (share_vertex(mesh().triangles()[face], mesh().triangles()[other])) return;
       if (boxes[face].overlaps(boxes[other])) visit(face, other);
     });
   }

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/geometry/detail/face_measures.h"
 #include "asperity/geometry/index_table.h"
 
@@ -419,6 +420,17 @@ Result<TriangleMesh> TriangleMesh::moved(std::span<const Vec3> positions) const 
 Vec3 TriangleMesh::face_normal(std::uint32_t face) const noexcept {
   const auto [a, b, c] = corners(face);
   return (b - a).cross(c - a).normalized();
+}
+
+std::vector<FaceCorners> TriangleMesh::face_corners() const {
+  constexpr std::size_t share = 1024;
+  std::vector<FaceCorners> all(triangles_.size());
+  parallel_for((all.size() + share - 1) / share, {}, [&](std::size_t i) {
+    const std::size_t first = i * share;
+    const std::size_t count = std::min(share, all.size() - first);
+    measure_corners(positions_, triangles_.subspan(first, count), std::span(all).subspan(first, count));
+  });
+  return all;
 }
 
 std::uint32_t TriangleMesh::neighbour(std::uint32_t face, int edge) const noexcept {

@@ -49,6 +49,12 @@ struct MeshBuildSettings {
   bool orient_outward = true;  ///< flip a closed, oriented mesh whose volume is negative
 };
 
+/// Unit normal of a triangle, and the angles at its corners.
+struct FaceCorners {
+  Vec3 normal;
+  double angle[3];
+};
+
 /// Immutable triangle mesh: welded positions (m, object frame), corner UVs, vertex adjacency.
 ///
 /// Corners of triangles are welded by position alone, so that a UV seam never breaks adjacency.
@@ -81,6 +87,8 @@ class TriangleMesh {
   }
   /// Unit face normal, computed from the corners (right-hand rule). [servo]
   [[nodiscard]] Vec3 face_normal(std::uint32_t face) const noexcept;
+  /// Normals of all triangles and angles at their corners (to 1e-12 of an angle), on all cores. [build]
+  [[nodiscard]] std::vector<FaceCorners> face_corners() const;
   /// Unit vertex normal, weighted by the angles of the incident triangles. [servo]
   [[nodiscard]] Vec3 vertex_normal(std::uint32_t vertex) const noexcept {
     return vertex_normals_[vertex].cast<double>();
@@ -148,7 +156,12 @@ class TriangleMesh {
 
 /// Whether two triangles have a corner in common. [servo]
 inline bool share_vertex(const TriangleMesh::Triangle& a, const TriangleMesh::Triangle& b) noexcept {
-  return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
+  // All nine at once: which of them it is cannot be guessed.
+  unsigned same = 0;
+  for (const std::uint32_t one : a) {
+    for (const std::uint32_t other : b) same |= static_cast<unsigned>(one == other);
+  }
+  return same != 0;
 }
 
 /// Calls `visit(face)` once for every triangle that shares at least one vertex with `face`, itself included:

@@ -61,9 +61,10 @@ class TriangleIndex {
   void for_each_in_box(const Box& box, Visit&& visit) const {
     std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, inside_->structure);
   }
-  /// Calls visit(one, other) once for every pair of triangles whose boxes meet (m; one for each triangle, around it),
-  /// and perhaps for some that miss each other by a rounding. [build]
-  void for_each_meeting(std::span<const Box> boxes, const MeetingVisit& visit) const;
+  /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet (m; one for each
+  /// triangle, around it), and perhaps for some that miss each other by a rounding; in no order, and from several
+  /// threads at a time. `enclosed`: of the boxes. [build]
+  void for_each_meeting(std::span<const Box> boxes, const FaceBoxes& enclosed, const MeetingVisit& visit) const;
   /// Calls visit(face), roughly from near to far, for every triangle whose bounding box grown by `radius` (m) the
   /// segment meets; visit answers the fraction of the segment beyond which nothing is wanted any more. [servo]
   template <class Visit>

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 
@@ -18,18 +21,12 @@ struct WeightedNormal {
   double weight;
 };
 
-/// `normals`: of all faces. `around` is filled anew.
-void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const std::vector<Vec3>& normals,
+/// `corners`: of all faces. `around` is filled anew.
+void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const std::vector<FaceCorners>& corners,
                          std::vector<WeightedNormal>& around) {
   around.clear();
-  for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
-    const TriangleMesh::Triangle& corners = mesh.triangles()[face];
-    const std::size_t k = mesh.corner_of(face, vertex);
-    const Vec3& here = mesh.positions()[vertex];
-    const Vec3 one = mesh.positions()[corners[(k + 1) % 3]] - here;
-    const Vec3 other = mesh.positions()[corners[(k + 2) % 3]] - here;
-    around.push_back({normals[face], std::atan2(one.cross(other).norm(), one.dot(other))});
-  }
+  for (const std::uint32_t face : mesh.faces_of_vertex(vertex))
+    around.push_back({corners[face].normal, corners[face].angle[mesh.corner_of(face, vertex)]});
 }
 
 double least_normal_product(const std::vector<WeightedNormal>& around, const Vec3& direction) {
@@ -54,18 +51,37 @@ Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
 /// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings).
 Vec3 least_squares(const std::vector<WeightedNormal>& around, const Vec3& normal) {
   constexpr double hold = 1e-3;
-  Mat3 matrix = Mat3::Zero();
+  // The matrix is symmetric: its upper half.
+  double xx = 0.0;
+  double xy = 0.0;
+  double xz = 0.0;
+  double yy = 0.0;
+  double yz = 0.0;
+  double zz = 0.0;
   Vec3 right = Vec3::Zero();
   double total = 0.0;
   for (const WeightedNormal& face : around) {
-    matrix += face.weight * face.normal * face.normal.transpose();
-    right += face.weight * face.normal;
+    const Vec3& n = face.normal;
+    const Vec3 weighted = face.weight * n;
+    xx += weighted.x() * n.x();
+    xy += weighted.x() * n.y();
+    xz += weighted.x() * n.z();
+    yy += weighted.y() * n.y();
+    yz += weighted.y() * n.z();
+    zz += weighted.z() * n.z();
+    right += weighted;
     total += face.weight;
   }
   if (total == 0.0) return normal;
-  matrix += hold * total * Mat3::Identity();
+  xx += hold * total;
+  yy += hold * total;
+  zz += hold * total;
   right += hold * total * scaled(around, normal);
-  return matrix.inverse() * right;
+  const Vec3 first(yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+  const Vec3 second(first.y(), xx * zz - xz * xz, xy * xz - xx * yz);
+  const Vec3 third(first.z(), second.z(), xx * yy - xy * xy);
+  const double det = xx * first.x() + xy * first.y() + xz * first.z();
+  return Vec3(first.dot(right), second.dot(right), third.dot(right)) / det;
 }
 
 /// The direction whose least product with the normals around is largest, by pulling towards the worst one.
@@ -248,44 +264,64 @@ ShellInterval ShellPrism::injective(double margin, double limit) const noexcept 
   return interval;
 }
 
+bool ShellPrism::holds(double margin, double limit) const noexcept {
+  const Vec3 c0 = edge_u.cross(edge_v);
+  const Vec3 c1 = edge_u.cross(turn_v) + turn_u.cross(edge_v);
+  const Vec3 c2 = turn_u.cross(turn_v);
+  // With room to spare against what `injective` leaves of the volume.
+  constexpr double share = 0.9;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 n = direction_at(k == 1 ? 1.0 + 2.0 * margin : -margin, k == 2 ? 1.0 + 2.0 * margin : -margin);
+    if (!(std::abs(n.dot(c1)) * limit + std::abs(n.dot(c2)) * limit * limit < share * n.dot(c0))) return false;
+  }
+  return true;
+}
+
 Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   Shell shell;
   const std::size_t count = mesh.positions().size();
-  std::vector<Vec3> directions(count);
-  std::vector<std::vector<WeightedNormal>> around;
-  if (how == ShellDirections::relaxed) around.resize(count);
-  std::vector<Vec3> normals(mesh.triangles().size());
-  for (std::uint32_t face = 0; face < normals.size(); ++face) normals[face] = mesh.face_normal(face);
-  std::vector<WeightedNormal> here;
-  for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
-    find_normals_around(mesh, vertex, normals, here);
+  const bool relaxed = how == ShellDirections::relaxed;
+  shell.directions.resize(count);
+  std::vector<Vec3> directions(relaxed ? count : 0);
+  std::vector<std::vector<WeightedNormal>> around(relaxed ? count : 0);
+  const std::vector<FaceCorners> corners = mesh.face_corners();
+  const ParallelSettings shares{.grain = 512};
+  struct Found {
+    std::vector<WeightedNormal> around;  ///< scratch
+    std::vector<std::uint32_t> blind;
+    std::uint32_t turned = 0;
+  };
+  std::vector<Found> found(parallel_workers(count, shares));
+  parallel_for(count, shares, [&](std::size_t i, unsigned worker) {
+    const auto vertex = static_cast<std::uint32_t>(i);
+    auto& [here, blind, turned] = found[worker];
+    find_normals_around(mesh, vertex, corners, here);
     const Vec3 normal = mesh.vertex_normal(vertex);
-    directions[vertex] = normal;
+    Vec3 direction = normal;
     if (!here.empty()) {
-      Vec3 direction = least_squares(here, normal);
+      direction = least_squares(here, normal);
       const bool safe = least_normal_product(here, direction) >= least_product && direction.norm() <= longest_direction;
       if (!safe) {
         const Vec3 seen = most_seen(here, normal);
         direction = scaled(here, seen);
-        ++shell.turned_vertices;
-        if (least_normal_product(here, seen) <= 1e-3) shell.blind_vertices.push_back(vertex);
+        ++turned;
+        if (least_normal_product(here, seen) <= 1e-3) blind.push_back(vertex);
       }
-      directions[vertex] = direction;
     }
-    if (how == ShellDirections::relaxed) around[vertex] = here;
+    shell.directions[i] = direction.cast<float>();
+    if (!relaxed) return;
+    directions[i] = direction;
+    around[i] = here;
+  });
+  for (const Found& one : found) {
+    shell.turned_vertices += one.turned;
+    shell.blind_vertices.insert(shell.blind_vertices.end(), one.blind.begin(), one.blind.end());
   }
-  if (how == ShellDirections::relaxed) relax(mesh, around, directions);
-  shell.directions.reserve(count);
-  for (const Vec3& direction : directions) shell.directions.push_back(direction.cast<float>());
+  std::sort(shell.blind_vertices.begin(), shell.blind_vertices.end());
+  if (!relaxed) return shell;
+  relax(mesh, around, directions);
+  for (std::size_t i = 0; i < count; ++i) shell.directions[i] = directions[i].cast<float>();
   return shell;
-}
-
-ShellPrism Shell::prism(const TriangleMesh& mesh, std::uint32_t face) const noexcept {
-  const TriangleMesh::Triangle& t = mesh.triangles()[face];
-  const Vec3& a = mesh.positions()[t[0]];
-  const Vec3 n = directions[t[0]].cast<double>();
-  return {a, mesh.positions()[t[1]] - a,          mesh.positions()[t[2]] - a,
-          n, directions[t[1]].cast<double>() - n, directions[t[2]].cast<double>() - n};
 }
 
 }  // namespace asperity

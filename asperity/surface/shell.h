@@ -56,6 +56,9 @@ struct ShellPrism {
   /// closed form (formulation D2). Empty (lower >= upper) when the shell is folded over at height 0. `limit` (m) bounds
   /// the answer. [build]
   [[nodiscard]] ShellInterval injective(double margin, double limit) const noexcept;
+  /// Whether `injective` is known, without roots, to hold all heights within `limit` (m) of the triangle. Nearly every
+  /// prism of a relief is: those that are not have to be asked. [build]
+  [[nodiscard]] bool holds(double margin, double limit) const noexcept;
 };
 
 /// Gradients of the shell coordinates at a place (1/m, 1/m, m/m).
@@ -88,7 +91,13 @@ struct Shell {
   /// [build]
   static Shell build(const TriangleMesh& mesh, ShellDirections how = ShellDirections::least_squares);
   /// The prism over `face`. [servo]
-  [[nodiscard]] ShellPrism prism(const TriangleMesh& mesh, std::uint32_t face) const noexcept;
+  [[nodiscard]] ShellPrism prism(const TriangleMesh& mesh, std::uint32_t face) const noexcept {
+    const TriangleMesh::Triangle& t = mesh.triangles()[face];
+    const Vec3& a = mesh.positions()[t[0]];
+    const Vec3 n = directions[t[0]].cast<double>();
+    return {a, mesh.positions()[t[1]] - a,          mesh.positions()[t[2]] - a,
+            n, directions[t[1]].cast<double>() - n, directions[t[2]].cast<double>() - n};
+  }
 };
 
 }  // namespace asperity

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
+#include <thread>
 
 #include "asperity/surface/relief/view.h"
 #include "tests/surface/reliefs.h"
@@ -170,6 +172,120 @@ TEST(ReliefRefit, OverlapsComeAndGo) {
   EXPECT_EQ(straight.report().overlapping_pairs, 0u);
   for (std::uint32_t face = 0; face < straight.base().mesh().triangles().size(); ++face)
     EXPECT_FALSE(straight.overlapped(face));
+}
+
+/// All that a relief found out of itself is that of another one, bit for bit.
+void expect_the_same(const ReliefSurface& one, const ReliefSurface& other) {
+  EXPECT_EQ(one.shell().directions, other.shell().directions);
+  EXPECT_EQ(one.reach(), other.reach());
+  EXPECT_EQ(one.skin(), other.skin());
+  const ReliefReport& report = one.report();
+  const ReliefReport& same = other.report();
+  EXPECT_EQ(report.faces_at_fault, same.faces_at_fault);
+  EXPECT_EQ(report.blind_vertices, same.blind_vertices);
+  EXPECT_EQ(report.fitting_share, same.fitting_share);
+  EXPECT_EQ(report.lowered_vertices, same.lowered_vertices);
+  EXPECT_EQ(report.least_share, same.least_share);
+  EXPECT_EQ(report.directions_relaxed, same.directions_relaxed);
+  EXPECT_EQ(report.overlapping_pairs, same.overlapping_pairs);
+  const auto faces = static_cast<std::uint32_t>(one.base().mesh().triangles().size());
+  Rng rng(5);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    ASSERT_EQ(one.range(face).lowest, other.range(face).lowest);
+    ASSERT_EQ(one.range(face).highest, other.range(face).highest);
+    ASSERT_EQ(one.overlapped(face), other.overlapped(face));
+    const Vec3 at = test::random_barycentric(rng);
+    ASSERT_EQ(one.point(one.frame(face), at[1], at[2]).point, other.point(other.frame(face), at[1], at[2]).point);
+  }
+  const auto expect_boxes = [](const std::vector<BoxesOf8>& boxes, const std::vector<BoxesOf8>& equal) {
+    ASSERT_EQ(boxes.size(), equal.size());
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t k = 0; k < 8; ++k) {
+          ASSERT_EQ(boxes[i].lower[axis][k], equal[i].lower[axis][k]);
+          ASSERT_EQ(boxes[i].upper[axis][k], equal[i].upper[axis][k]);
+        }
+      }
+    }
+  };
+  expect_boxes(one.boxes().leaves, other.boxes().leaves);
+  expect_boxes(one.boxes().nodes, other.boxes().nodes);
+}
+
+TEST(ReliefRefit, HowTheBaseMovesItIsTheReliefBuiltAnew) {
+  Rng rng(8);
+  int lowered = 0;
+  int turned = 0;
+  int come_to_overlap = 0;
+  for (int trial = 0; trial < 36; ++trial) {
+    SCOPED_TRACE(trial);
+    // Sheets have texture coordinates that are continuous: no seams. Elsewhere each face has its own.
+    const bool sheet = trial % 2 == 0;
+    const FoldMode folds = trial % 6 < 3 ? FoldMode::keep : trial % 6 < 5 ? FoldMode::round : FoldMode::fillet;
+    MeshSource source =
+        sheet ? plane_grid(0.06, 0.04, 16, 10) : random_closed_mesh(static_cast<std::uint64_t>(trial), 2, 0.02, 0.1);
+    const double amplitude = rng.uniform(0.1e-3, 1.5e-3);
+    const auto rest = test::coated(std::move(source), test::wavy_map(amplitude),
+                                   sheet ? Mapping::uv : Mapping::per_face, 0.01, 1.0, of(folds));
+    DeformableMesh deformable(rest->base());
+    const double bump = rng.uniform(0.0, 1.5e-3);
+    const double bend = trial % 3 == 0 ? rng.uniform(60.0, 110.0) : rng.uniform(0.0, 20.0);  // 1/m
+    const auto move = [&](const Vec3& p) {
+      // Rolled up about y: the ends of the sheet may come to meet.
+      const double angle = bend * p.x();
+      const double radius = 1.0 / std::max(bend, 1e-3) - p.z();
+      return Vec3(Vec3(radius * std::sin(angle), p.y(), -radius * std::cos(angle)) + test::random_vector(rng, bump));
+    };
+    for (int step = 0; step < 2; ++step) {
+      const MeshSurface base = must(deformable.moved(moved_positions(rest->base().mesh(), move)));
+      const ReliefSurface built(base, rest->coat());
+      const ReliefSurface moved = must(rest->moved(base));
+      expect_the_same(moved, built);
+      // Nor does it matter where it comes from.
+      expect_the_same(must(moved.moved(base)), built);
+      lowered += moved.report().lowered_vertices > 0;
+      turned += moved.report().directions_relaxed;
+      come_to_overlap += !rest->overlaps() && moved.overlaps();
+    }
+  }
+  EXPECT_GT(lowered, 5);
+  EXPECT_GT(turned, 0);
+  EXPECT_GT(come_to_overlap, 5);
+}
+
+TEST(ReliefRefit, BoundsHoldTheReliefOfAMappingByPlaces) {
+  Rng rng(9);
+  Fixture fixture(Mapping::triplanar);
+  const ReliefSurface moved =
+      fixture.moved_by([&](const Vec3& p) { return waved(p + test::random_vector(rng, 2e-4)); });
+  const FacePart whole = FacePart::triangle({0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0});
+  for (std::uint32_t face = 0; face < moved.base().mesh().triangles().size(); ++face) {
+    const ReliefFrame frame = moved.frame(face);
+    const HeightForm form = moved.form(frame, whole);
+    for (int i = 0; i < 20; ++i) {
+      const Vec3 at = test::random_barycentric(rng);
+      const double height = moved.height(frame, at[1], at[2]).height;
+      EXPECT_GE(height, moved.range(face).lowest);
+      EXPECT_LE(height, moved.range(face).highest);
+      EXPECT_LE(std::abs(height - form.height - form.u * (at[1] - 1.0 / 3.0) - form.v * (at[2] - 1.0 / 3.0)),
+                form.error + 1e-15);
+    }
+  }
+}
+
+TEST(ReliefRefit, ManyThreadsMayMoveOneRelief) {
+  Fixture fixture(Mapping::triplanar);
+  const MeshSurface base = must(fixture.deformable.moved(moved_positions(fixture.rest->base().mesh(), waved)));
+  std::vector<std::optional<ReliefSurface>> moved(4);
+  std::vector<std::thread> threads;
+  for (auto& one : moved) {
+    threads.emplace_back([&] {
+      EXPECT_GT(fixture.rest->memory_bytes(), 0u);
+      one = must(fixture.rest->moved(base));
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& one : moved) expect_the_same(*one, *moved[0]);
 }
 
 TEST(ReliefRefit, OlderSnapshotsGoOnAnswering) {

@@ -168,6 +168,32 @@ ASPERITY_INLINE void measure_all(std::span<const Vec3> positions, std::span<cons
   normalize_all(sums, normals);
 }
 
+ASPERITY_INLINE void shape_all(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                               std::span<FaceCorners> corners) {
+  for (std::size_t first = 0; first < triangles.size(); first += lane_count) {
+    const std::size_t count = std::min(lane_count, triangles.size() - first);
+    const Triangle* faces[lane_count];
+    for (std::size_t i = 0; i < lane_count; ++i) faces[i] = &triangles[first + std::min(i, count - 1)];
+    FourFaces four;
+    Totals unused;
+    measure_four(positions.data(), faces, Vec3::Zero(), Lanes{}, four, unused);
+    for (std::size_t i = 0; i < count; ++i) {
+      corners[first + i] = {Vec3(four.normal[0][i], four.normal[1][i], four.normal[2][i]),
+                            {four.angle[0][i], four.angle[1][i], four.angle[2][i]}};
+    }
+  }
+}
+
+void shape_plain(std::span<const Vec3> positions, std::span<const Triangle> triangles, std::span<FaceCorners> corners) {
+  shape_all(positions, triangles, corners);
+}
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) void shape_avx2(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                                                std::span<FaceCorners> corners) {
+  shape_all(positions, triangles, corners);
+}
+#endif
+
 void measure_plain(std::span<const Vec3> positions, std::span<const Triangle> triangles, const Vec3& centre,
                    NormalSums& sums, std::vector<Vec3f>& normals, Totals& totals) {
   measure_all(positions, triangles, centre, sums, normals, totals);
@@ -191,6 +217,17 @@ double least_of(const Lanes& x) {
 }
 
 }  // namespace
+
+void measure_corners(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                     std::span<FaceCorners> corners) {
+#if defined(__x86_64__)
+  static const bool wide = __builtin_cpu_supports("avx2");
+  const auto shape = wide ? shape_avx2 : shape_plain;
+#else
+  const auto shape = shape_plain;
+#endif
+  shape(positions, triangles, corners);
+}
 
 FaceMeasures measure_faces(std::span<const Vec3> positions, std::span<const Triangle> triangles, const Vec3& centre,
                            NormalSums& sums, std::vector<Vec3f>& normals) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "asperity/core/math.h"
+#include "asperity/geometry/mesh.h"
 
 namespace asperity {
 
@@ -30,5 +31,9 @@ using NormalSums = std::vector<Vec3>;
 /// vertex cancel, its normal is left zero. [build]
 FaceMeasures measure_faces(std::span<const Vec3> positions, std::span<const std::array<std::uint32_t, 3>> triangles,
                            const Vec3& centre, NormalSums& sums, std::vector<Vec3f>& normals);
+
+/// TriangleMesh::face_corners, for some of a mesh's triangles. [build]
+void measure_corners(std::span<const Vec3> positions, std::span<const std::array<std::uint32_t, 3>> triangles,
+                     std::span<FaceCorners> corners);
 
 }  // namespace asperity

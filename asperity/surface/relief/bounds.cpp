@@ -181,22 +181,7 @@ HeightForm ReliefSurface::stitched_form(const ReliefFrame& frame, const FacePart
 }
 
 ReliefBound ReliefSurface::bound(const ReliefFrame& frame, const FacePart& part) const noexcept {
-  const HeightForm height = form(frame, part);
-  const ShellPrism& prism = frame.prism;
-  const Vec3 direction = prism.direction_at(part.middle.x(), part.middle.y());
-  const Vec3 middle = prism.base_at(part.middle.x(), part.middle.y()) + height.height * direction;
-  const Vec3 along_u = prism.edge_u + height.u * direction + height.height * prism.turn_u;
-  const Vec3 along_v = prism.edge_v + height.v * direction + height.height * prism.turn_v;
-  ReliefBound bound;
-  for (int k = 0; k < 3; ++k) {
-    const Vec2 off = part.corner[static_cast<std::size_t>(k)] - part.middle;
-    bound.corner[k] = middle + off.x() * along_u + off.y() * along_v;
-  }
-  // The slopes of height and direction over one another, and what the height has beside its plane.
-  const double turn = part.spread(prism.turn_u, prism.turn_v);
-  bound.error = part.spread(height.u, height.v) * turn + height.error * (direction.norm() + turn) +
-                4e-16 * middle.cwiseAbs().sum();
-  return bound;
+  return bound_over(frame.prism, form(frame, part), part);
 }
 
 }  // namespace asperity

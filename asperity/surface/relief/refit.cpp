@@ -2,16 +2,35 @@
 
 #include <algorithm>
 
-#include "asperity/surface/relief/surface.h"
+#include "asperity/core/parallel_for.h"
+#include "asperity/surface/relief/detail/carried.h"
 
 namespace asperity {
+
+void ReliefSurface::carry() const {
+  // Heights that may be anything within the coat's are enclosed without asking the coat.
+  if (any_height()) return;
+  std::call_once(carried_->once, [&] {
+    const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
+    const auto levels = static_cast<std::size_t>(coat_.levels()) + 1;
+    std::vector<CarriedHeight> heights(rest_.mesh().triangles().size() * levels);
+    parallel_for(heights.size(), {.grain = 256}, [&](std::size_t i) {
+      const CoatMoment moment{static_cast<double>(i % levels), 0.0};
+      const CoatFrame frame = coat_.frame(rest_.mesh(), static_cast<std::uint32_t>(i / levels), moment);
+      heights[i] = {coat_.range(frame, whole_triangle), coat_.form(frame, whole)};
+    });
+    carried_->heights = std::move(heights);
+    carried_->bytes = carried_->heights.capacity() * sizeof(CarriedHeight);
+  });
+}
 
 Result<ReliefSurface> ReliefSurface::moved(MeshSurface base) const {
   if (base.index().lineage() != base_.index().lineage()) {
     return refused(ErrorCode::mismatch, "is not the base of this relief with its vertices moved", "base",
                    "a mesh that DeformableMesh made of the relief's own base");
   }
-  ReliefSurface relief(std::move(base), coat_, rest_);
+  carry();
+  ReliefSurface relief(std::move(base), coat_, rest_, carried_);
   ASPERITY_CHECK(relief.settle(settings_));
   return relief;
 }

@@ -3,65 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "asperity/core/identity.h"
 #include "asperity/core/parallel_for.h"
+#include "asperity/surface/relief/detail/bounds.h"
+#include "asperity/surface/relief/detail/carried.h"
+#include "asperity/surface/relief/detail/slabs.h"
 
 namespace asperity {
 
 namespace {
-
-constexpr int corner_u[3] = {0, 1, 0};
-constexpr int corner_v[3] = {0, 0, 1};
-
-const Vec2 whole_triangle[3] = {Vec2(0.0, 0.0), Vec2(1.0, 0.0), Vec2(0.0, 1.0)};
-
-/// The six points whose hull holds all of the relief over a triangle.
-std::array<Vec3, 6> hull_points(const ShellPrism& prism, const HeightRange& range) {
-  std::array<Vec3, 6> points;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3 base = prism.base_at(corner_u[k], corner_v[k]);
-    const Vec3 direction = prism.direction_at(corner_u[k], corner_v[k]);
-    points[2 * k] = base + range.lowest * direction;
-    points[2 * k + 1] = base + range.highest * direction;
-  }
-  return points;
-}
-
-/// Whether a plane of one of these directions separates two hulls. Cheap, and right for most pairs that boxes let
-/// through.
-bool separated(const std::array<Vec3, 6>& a, const std::array<Vec3, 6>& b, const Vec3& axis) {
-  double a_low = infinity;
-  double a_high = -infinity;
-  double b_low = infinity;
-  double b_high = -infinity;
-  for (std::size_t i = 0; i < 6; ++i) {
-    a_low = std::min(a_low, axis.dot(a[i]));
-    a_high = std::max(a_high, axis.dot(a[i]));
-    b_low = std::min(b_low, axis.dot(b[i]));
-    b_high = std::max(b_high, axis.dot(b[i]));
-  }
-  return a_high < b_low || b_high < a_low;
-}
-
-/// Tries the directions that separate most pairs: across either triangle, across their edges, from one to the other.
-bool hulls_apart(const ShellPrism& one, const std::array<Vec3, 6>& one_hull, const ShellPrism& other,
-                 const std::array<Vec3, 6>& other_hull) {
-  const Vec3 normal = one.edge_u.cross(one.edge_v);
-  const Vec3 other_normal = other.edge_u.cross(other.edge_v);
-  if (separated(one_hull, other_hull, normal) || separated(one_hull, other_hull, other_normal)) return true;
-  if (separated(one_hull, other_hull, other.base_at(1.0 / 3.0, 1.0 / 3.0) - one.base_at(1.0 / 3.0, 1.0 / 3.0)))
-    return true;
-  const Vec3 edges[3] = {one.edge_u, one.edge_v, one.edge_v - one.edge_u};
-  const Vec3 other_edges[3] = {other.edge_u, other.edge_v, other.edge_v - other.edge_u};
-  for (int k = 0; k < 3; ++k) {
-    if (separated(one_hull, other_hull, normal.cross(edges[k])) ||
-        separated(one_hull, other_hull, other_normal.cross(other_edges[k])))
-      return true;
-  }
-  return false;
-}
 
 Error overlap_error(const std::string& what) {
   return refused(ErrorCode::bad_mesh, what, "coat", "a lower relief, or on_overlap \"cure\"");
@@ -90,18 +43,23 @@ std::string ReliefReport::advice() const {
   return text + "; a base mesh that follows the shape more finely takes higher reliefs";
 }
 
-ReliefSurface::ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest)
-    : identity_(next_identity()), base_(std::move(base)), rest_(std::move(rest)), coat_(std::move(coat)) {
+ReliefSurface::ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest, std::shared_ptr<CarriedHeights> carried)
+    : identity_(next_identity()),
+      base_(std::move(base)),
+      rest_(std::move(rest)),
+      coat_(std::move(coat)),
+      carried_(std::move(carried)) {
   fit(ShellDirections::least_squares);
 }
 
 // Braces: the check comes before the coat is moved.
 ReliefSurface::ReliefSurface(MeshSurface base, Coat coat)
-    : ReliefSurface{(static_cast<void>(coat.check_fits(base.mesh()).value()), base), std::move(coat), base} {}
+    : ReliefSurface{(static_cast<void>(coat.check_fits(base.mesh()).value()), base), std::move(coat), base,
+                    std::make_shared<CarriedHeights>()} {}
 
 Result<ReliefSurface> ReliefSurface::build(MeshSurface base, Coat coat, const ReliefSettings& settings) {
   ASPERITY_CHECK(coat.check_fits(base.mesh()));
-  ReliefSurface relief(base, std::move(coat), base);
+  ReliefSurface relief(base, std::move(coat), base, std::make_shared<CarriedHeights>());
   ASPERITY_CHECK(relief.settle(settings));
   return relief;
 }
@@ -147,16 +105,18 @@ std::vector<double> ReliefSurface::fitting_shares() const {
   std::vector<double> share(mesh.triangles().size(), 1.0);
   const double margin = !bands_.empty() && stitching.folds != FoldMode::keep ? 2.0 * stitching.rho : 0.0;
   const double most = 2.0 * coat_.amplitude_bound() + 1e-12;
-  for (std::uint32_t face = 0; face < share.size(); ++face) {
-    const ShellInterval room = shell_.prism(mesh, face).injective(margin, most);
+  parallel_for(share.size(), {.grain = 256}, [&](std::size_t i) {
+    const auto face = static_cast<std::uint32_t>(i);
     // Nearly every prism has room for all that the coat holds anywhere.
-    if (room.upper > room.lower && room.upper >= coat_.highest() && room.lower <= coat_.lowest()) continue;
+    const ShellPrism prism = shell_.prism(mesh, face);
+    if (prism.holds(margin, coat_.amplitude_bound())) return;
+    const ShellInterval room = prism.injective(margin, most);
+    if (room.upper > room.lower && room.upper >= coat_.highest() && room.lower <= coat_.lowest()) return;
     const HeightRange heights = range(frame(face), whole_triangle);
-    if (room.upper > 0.0 && heights.highest > room.upper) share[face] = room.upper / heights.highest;
-    if (room.lower < 0.0 && heights.lowest < room.lower)
-      share[face] = std::min(share[face], room.lower / heights.lowest);
-    if (!(room.upper > room.lower)) share[face] = 0.0;
-  }
+    if (room.upper > 0.0 && heights.highest > room.upper) share[i] = room.upper / heights.highest;
+    if (room.lower < 0.0 && heights.lowest < room.lower) share[i] = std::min(share[i], room.lower / heights.lowest);
+    if (!(room.upper > room.lower)) share[i] = 0.0;
+  });
   return share;
 }
 
@@ -202,9 +162,27 @@ void ReliefSurface::fit(ShellDirections directions) {
   reach_ = longest * (coat_.amplitude_bound() + fold_depth_);
   grain_ = std::min(coat_.texel_size(), mesh.mean_edge());
   skin_ = std::min(base_.skin(), 1e-3 * grain_);
-  const std::vector<Box> boxes = enclose();
+  const std::size_t faces = mesh.triangles().size();
+  const auto room = std::make_unique_for_overwrite<RoundedSlab[]>(faces);
+  const std::span<RoundedSlab> slabs(room.get(), faces);
+  const std::vector<Box> boxes = enclose(slabs);
   boxes_ = base_.index().enclosed(boxes);
-  find_overlaps(boxes);
+  find_overlaps(boxes, slabs);
+}
+
+bool ReliefSurface::any_height() const noexcept {
+  // Levels of layers go by those of the first map, and may pass one of their own between two of its.
+  return coat_.moves() || (coat_.levels() > 0 && !coat_.layers().empty());
+}
+
+bool ReliefSurface::on_its_own(std::uint32_t face) const noexcept {
+  const TriangleMesh::Triangle& t = base_.mesh().triangles()[face];
+  const bool joins = coat_.settings().stitching.folds != FoldMode::keep;
+  for (const std::uint32_t vertex : t) {
+    if (!bands_.empty() && (joins || coat_.seam_at(vertex))) return false;
+    if (!shares_.empty() && shares_[vertex] != 1.0F) return false;
+  }
+  return true;
 }
 
 void ReliefSurface::lower(const std::vector<double>& share_of_face) {
@@ -221,34 +199,40 @@ void ReliefSurface::lower(const std::vector<double>& share_of_face) {
   shares_ = std::move(share);
 }
 
-std::vector<Box> ReliefSurface::enclose() {
+std::vector<Box> ReliefSurface::enclose(std::span<RoundedSlab> slabs) {
   const TriangleMesh& mesh = base_.mesh();
   const std::size_t faces = mesh.triangles().size();
   std::vector<Box> boxes(faces);
   ranges_.assign(faces, {});  // nothing is known of any face yet
   const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
-  // Levels of layers go by those of the first map, and may pass one of their own between two of its.
-  const bool anything = coat_.moves() || (coat_.levels() > 0 && !coat_.layers().empty());
+  const bool anything = any_height();
+  const std::vector<CarriedHeight>& carried = carried_->heights;
   // Rounded outwards by more than a float rounds.
   const auto rounded = [](double value, double sign) {
     return static_cast<float>(value + sign * 1e-6 * std::abs(value) + sign * 1e-30);
   };
   parallel_for(faces, {.grain = 256}, [&](std::size_t i) {
     const auto face = static_cast<std::uint32_t>(i);
+    const ShellPrism prism = shell_.prism(mesh, face);
     HeightRange all{infinity, -infinity};
     Box box;
     if (anything) {
       all = {std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_};
-      for (const Vec3& point : hull_points(shell_.prism(mesh, face), all)) box.include(point);
+      box = box_around({prism, all});
     } else {
+      const bool known = !carried.empty() && on_its_own(face);
       for (int level = 0; level <= coat_.levels(); ++level) {
-        const ReliefFrame frame = this->frame(face, {static_cast<double>(level), 0.0});
-        const HeightRange range = this->range(frame, whole_triangle);
-        all = {std::min(all.lowest, range.lowest), std::max(all.highest, range.highest)};
+        CarriedHeight height;
+        if (known) {
+          height = carried[i * static_cast<std::size_t>(coat_.levels() + 1) + static_cast<std::size_t>(level)];
+        } else {
+          const ReliefFrame frame = this->frame(face, {static_cast<double>(level), 0.0});
+          height = {this->range(frame, whole_triangle), form(frame, whole)};
+        }
+        all = {std::min(all.lowest, height.range.lowest), std::max(all.highest, height.range.highest)};
         // Two ways to enclose it: what both hold.
-        Box slab;
-        for (const Vec3& point : hull_points(frame.prism, range)) slab.include(point);
-        const ReliefBound bound = this->bound(frame, whole);
+        const Box slab = box_around({prism, height.range});
+        const ReliefBound bound = bound_over(prism, height.form, whole);
         Box around;
         for (const Vec3& corner : bound.corner) around.include(corner);
         around = around.grown(bound.error);
@@ -260,31 +244,33 @@ std::vector<Box> ReliefSurface::enclose() {
     }
     boxes[i] = box;
     ranges_[i] = {rounded(all.lowest, -1.0), rounded(all.highest, 1.0)};
+    slabs[i] = rounded_slab({prism, range(face)}, mesh.bounds().centre());
   });
   return boxes;
 }
 
-void ReliefSurface::find_overlaps(const std::vector<Box>& boxes) {
+void ReliefSurface::find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs) {
   const TriangleMesh& mesh = base_.mesh();
-  const auto apart = [](const Box& a, const Box& b) {
-    return a.lower.x() > b.upper.x() || a.lower.y() > b.upper.y() || a.lower.z() > b.upper.z() ||
-           b.lower.x() > a.upper.x() || b.lower.y() > a.upper.y() || b.lower.z() > a.upper.z();
+  std::atomic<std::uint32_t> pairs{0};
+  overlapped_.assign(boxes.size(), 0);
+  const auto mark = [&](std::uint32_t face) {
+    std::atomic_ref<std::uint8_t>(overlapped_[face]).store(1, std::memory_order_relaxed);
   };
-  base_.index().for_each_meeting(boxes, [&](std::uint32_t face, std::uint32_t other) {
-    if (share_vertex(mesh.triangles()[face], mesh.triangles()[other]) || apart(boxes[face], boxes[other])) return;
-    const ShellPrism here = shell_.prism(mesh, face);
-    const ShellPrism there = shell_.prism(mesh, other);
-    if (hulls_apart(here, hull_points(here, range(face)), there, hull_points(there, range(other)))) return;
-    ++report_.overlapping_pairs;
-    if (overlapped_.empty()) overlapped_.resize(mesh.triangles().size(), 0);
-    overlapped_[face] = overlapped_[other] = 1;
+  base_.index().for_each_meeting(boxes, boxes_, [&](std::uint32_t face, std::uint32_t other) {
+    if (surely_apart(slabs[face], slabs[other]) || !boxes[face].overlaps(boxes[other])) return;
+    if (slabs_apart({shell_.prism(mesh, face), range(face)}, {shell_.prism(mesh, other), range(other)})) return;
+    pairs.fetch_add(1, std::memory_order_relaxed);
+    mark(face);
+    mark(other);
   });
+  report_.overlapping_pairs = pairs;
+  if (pairs == 0) overlapped_ = {};
 }
 
 std::size_t ReliefSurface::memory_bytes() const noexcept {
   return base_.index().memory_bytes() + coat_.memory_bytes() + shell_.directions.capacity() * sizeof(Vec3f) +
          bands_.capacity() * sizeof(StitchBand) + shares_.capacity() * sizeof(float) + overlapped_.capacity() +
-         ranges_.capacity() * sizeof(FaceRange) + boxes_.memory_bytes();
+         ranges_.capacity() * sizeof(FaceRange) + boxes_.memory_bytes() + carried_->bytes;
 }
 
 ReliefFrame ReliefSurface::frame(std::uint32_t face, const CoatMoment& moment) const noexcept {

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 namespace asperity {
 
 class ReliefView;
+struct RoundedSlab;
 
 /// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
 enum class OnOverlap {
@@ -168,7 +170,10 @@ class ReliefSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
-  ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest);
+  struct CarriedHeights;
+  ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest, std::shared_ptr<CarriedHeights> carried);
+  /// Finds what the moved reliefs have in common with this one.
+  void carry() const;
   /// Does what the settings ask beyond the default.
   Status settle(const ReliefSettings& settings);
   void fit(ShellDirections directions);
@@ -179,8 +184,12 @@ class ReliefSurface {
   void lay_fillets();
   [[nodiscard]] float band_to(std::uint32_t face, int edge) const noexcept;
   void lower(const std::vector<double>& share_of_face);
-  [[nodiscard]] std::vector<Box> enclose();
-  void find_overlaps(const std::vector<Box>& boxes);
+  /// Whether heights over a face may be anything that the coat holds, from level to level and moment to moment.
+  [[nodiscard]] bool any_height() const noexcept;
+  /// Whether neither other faces nor a cure have a say in a face's heights.
+  [[nodiscard]] bool on_its_own(std::uint32_t face) const noexcept;
+  [[nodiscard]] std::vector<Box> enclose(std::span<RoundedSlab> slabs);
+  void find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs);
   [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
@@ -199,6 +208,7 @@ class ReliefSurface {
   MeshSurface base_;
   MeshSurface rest_;  ///< that the coat was laid on
   Coat coat_;
+  std::shared_ptr<CarriedHeights> carried_;  ///< shared with all reliefs that it is moved to
   ReliefSettings settings_;
   Shell shell_;
   std::vector<StitchBand> bands_;         ///< one a face, or empty: nothing to stitch

@@ -6,6 +6,7 @@
 
 #include "asperity/surface/height_form.h"
 #include "asperity/surface/relief/detail/weights.h"
+#include "asperity/surface/relief/surface.h"
 
 namespace asperity {
 
@@ -96,6 +97,24 @@ inline ProjectedPart project(const ShellPrism& from, const FacePart& part, const
         std::abs(gradient[k].dot(direction)) * rise_bend + gradient[k].norm() * turn * (rise_change + rise_bend);
   answer.seen = true;
   return answer;
+}
+
+/// Where a relief is over part of a face whose height is this. [servo]
+inline ReliefBound bound_over(const ShellPrism& prism, const HeightForm& height, const FacePart& part) noexcept {
+  const Vec3 direction = prism.direction_at(part.middle.x(), part.middle.y());
+  const Vec3 middle = prism.base_at(part.middle.x(), part.middle.y()) + height.height * direction;
+  const Vec3 along_u = prism.edge_u + height.u * direction + height.height * prism.turn_u;
+  const Vec3 along_v = prism.edge_v + height.v * direction + height.height * prism.turn_v;
+  ReliefBound bound;
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 off = part.corner[static_cast<std::size_t>(k)] - part.middle;
+    bound.corner[k] = middle + off.x() * along_u + off.y() * along_v;
+  }
+  // The slopes of height and direction over one another, and what the height has beside its plane.
+  const double turn = part.spread(prism.turn_u, prism.turn_v);
+  bound.error = part.spread(height.u, height.v) * turn + height.error * (direction.norm() + turn) +
+                4e-16 * middle.cwiseAbs().sum();
+  return bound;
 }
 
 }  // namespace asperity
