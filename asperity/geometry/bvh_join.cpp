@@ -18,7 +18,7 @@ namespace {
 #define ASPERITY_INLINE [[gnu::always_inline]] inline
 
 // As many as make starting a thread pay.
-constexpr std::size_t leaves_a_share = 128;
+constexpr std::size_t leaves_a_share = 256;
 
 using Floats = float __attribute__((vector_size(32)));
 using Ints = std::int32_t __attribute__((vector_size(32)));

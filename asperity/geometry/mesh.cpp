@@ -423,7 +423,7 @@ Vec3 TriangleMesh::face_normal(std::uint32_t face) const noexcept {
 }
 
 std::vector<FaceCorners> TriangleMesh::face_corners() const {
-  constexpr std::size_t share = 1024;
+  constexpr std::size_t share = 4096;
   std::vector<FaceCorners> all(triangles_.size());
   parallel_for((all.size() + share - 1) / share, {}, [&](std::size_t i) {
     const std::size_t first = i * share;

@@ -285,7 +285,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   std::vector<Vec3> directions(relaxed ? count : 0);
   std::vector<std::vector<WeightedNormal>> around(relaxed ? count : 0);
   const std::vector<FaceCorners> corners = mesh.face_corners();
-  const ParallelSettings shares{.grain = 512};
+  const ParallelSettings shares{.grain = 1024};
   struct Found {
     std::vector<WeightedNormal> around;  ///< scratch
     std::vector<std::uint32_t> blind;
