@@ -105,6 +105,7 @@
 #include "asperity/surface/tangents.h"
 #include "asperity/surface/view.h"
 #include "asperity/surface/walk.h"
+#include "asperity/surface/walk_step.h"
 
 // render: laws, scene, step
 #include "asperity/render/energy/account.h"

@@ -221,6 +221,30 @@ TEST_F(Program, ReplayIsBitEqualAndSaysWhenNot) {
   EXPECT_EQ(run("replay cut.asptrace").code, 1);
 }
 
+TEST_F(Program, ATraceFromBeforeTicksHadABudgetIsReplayedWithoutOne) {
+  json scene = json::parse(read("quick.json"));
+  scene["surfaces"][0]["coat"]["height_map"]["size"] = 1024;
+  scene["stroke"]["speed"] = "5m/s";
+  scene["stroke"]["end"] = json::array({"90%", "100%", "60%"});
+  scene["budget"] = 0;
+  write("free.json", scene.dump());
+  ASSERT_EQ(run("touch free.json --no-report --out free").code, 0);
+  Result<Trace> trace = read_trace((folder_ / "free/trace.asptrace").string());
+  ASSERT_TRUE(trace.ok());
+  json told = json::parse(trace->metadata.scene);
+  EXPECT_EQ(told["budget"], 0);
+  const auto replayed = [&](const char* name) {
+    trace->metadata.scene = told.dump();
+    EXPECT_TRUE(write_trace((folder_ / name).string(), trace->metadata, trace->records).ok());
+    return run(std::string("replay ") + name);
+  };
+  told.erase("budget");
+  EXPECT_EQ(replayed("before.asptrace").code, 0);
+  // Which matters here.
+  told["budget"] = 100;
+  EXPECT_EQ(replayed("other.asptrace").code, 1);
+}
+
 TEST_F(Program, CompareSetsLawsSideBySide) {
   const Call call = run("compare quick.json --laws force-shading,mesostructure --json");
   ASSERT_EQ(call.code, 0) << call.err;
