@@ -127,19 +127,17 @@ class Walk {
     // Mostly one; rounding up costs something.
     const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * asked_.moves)) : 1;
     bool any = false;
+    // On a short way the last place would be asked for twice as often as that saves.
+    constexpr int worth_it = 3;
+    bool ahead = false;
     if constexpr (looks_ahead) {
-      const int seen = count > 1 ? look_ahead(start, step, far, count, distance) : 0;
-      any = seen == count - 1 && attempt(far, border);
-      if (!any && seen > 0) {
-        go_to(chart_.moved(start, step, far * seen / count, -1));
-        any = true;
-      }
-    } else {
-      for (int i = 1; i <= count; ++i) {
-        if (!attempt(far * i / count, i == count ? border : -1)) break;
-        any = true;
-        if (out_of_moves()) return true;
-      }
+      ahead = count >= worth_it;
+      if (ahead) any = advance_ahead(start, step, far, count, border, distance, attempt);
+    }
+    for (int i = 1; !ahead && i <= count; ++i) {
+      if (!attempt(far * i / count, i == count ? border : -1)) break;
+      any = true;
+      if (out_of_moves()) return true;
     }
     if (any) return true;
     shortened_ = true;
@@ -176,12 +174,20 @@ class Walk {
     return seen;
   }
 
-  template <class To>
-  void go_to(const To& to) noexcept {
+  /// The same to the end of the step where the distance falls all along, or to the last sample before it. False where
+  /// the first one is no nearer.
+  template <class Start, class Attempt>
+  [[gnu::noinline]] bool advance_ahead(const Start& start, const WalkStep& step, double far, int count, int border,
+                                       double& distance, const Attempt& attempt) noexcept {
+    const int seen = look_ahead(start, step, far, count, distance);
+    if (seen == count - 1 && attempt(far, border)) return true;
+    if (seen == 0) return false;
+    const auto to = chart_.moved(start, step, far * seen / count, -1);
     ++moves_;
     Spot there;
     chart_.evaluate(to, there);
     chart_.take(to, there);
+    return true;
   }
 
   static constexpr bool looks_ahead = requires(const Chart& chart, const Vec2& to, const Vec3& goal) {

@@ -183,9 +183,12 @@ void see_what_is_left(Tick& tick, const Vec3& before) noexcept {
   // All that two ticks can do, for what no hand could tell, is as good as a rest. One may have flown in vain.
   constexpr double least_gain = 1e-4;
   ProxyState& state = tick.state;
+  if (tick.converged) {
+    state.idle = false;
+    return;
+  }
   const Vec3& position = tick.probe->pose.position;
-  const bool idle =
-      !tick.converged && (state.proxy - position).norm() >= (1.0 - least_gain) * (before - position).norm();
+  const bool idle = (state.proxy - position).norm() >= (1.0 - least_gain) * (before - position).norm();
   if (idle && state.idle) tick.converged = true;
   state.idle = idle;
   tick.open = !tick.converged && tick.cache.work().spent();

@@ -17,12 +17,6 @@ bool ReliefSurface::in_band(const ReliefFrame& frame, double u, double v) const 
   return false;
 }
 
-std::uint32_t ReliefSurface::partners_at(const ReliefFrame& frame, double u, double v) const noexcept {
-  std::uint32_t count = 0;
-  for_each_partner(frame, u, v, [&](std::uint32_t) { ++count; });
-  return count;
-}
-
 double ReliefSurface::height_alone(const ReliefFrame& frame, double u, double v) const noexcept {
   if (in_band(frame, u, v)) return height(frame, u, v).height;
   const double whole = coat_.height(frame.coat, u, v);

@@ -98,9 +98,10 @@ class ReliefSurface {
   }
   /// Height as rendered over a place of the frame's triangle. [servo]
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
-  /// Heights that are asked for there: the face's own and those of the faces that may have a say in it. [servo]
+  /// Heights that are asked for there, about: the face's own, and in a band those of the faces around. [servo]
   [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
-    return frame.stitched && in_band(frame, u, v) ? 1 + partners_at(frame, u, v) : 1;
+    constexpr std::uint32_t in_a_band = 4;
+    return frame.stitched && in_band(frame, u, v) ? in_a_band : 1;
   }
   /// The displaced surface over it. [servo]
   [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept {
@@ -195,7 +196,6 @@ class ReliefSurface {
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
-  [[nodiscard]] std::uint32_t partners_at(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightForm stitched_range(const ReliefFrame& frame, const FacePart& part) const noexcept;
