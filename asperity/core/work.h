@@ -30,7 +30,8 @@ struct WorkCount {
 };
 
 /// The work of one tick against its budget. It is counted, never timed, and whatever caches hold: a replay spends the
-/// same. A query is told as a whole when it ends, so that a tick goes over its budget by one query at most. [servo]
+/// same. A query is told as a whole when it ends: a tick goes over its budget by one, or by a move and the look at what
+/// is in its way. [servo]
 class WorkMeter {
  public:
   /// `budget`: in evaluations; 0: no limit. [servo]
@@ -50,5 +51,10 @@ class WorkMeter {
   WorkCount done_;
   std::uint32_t limit_ = unlimited;
 };
+
+/// Tells a meter, where there is one, what a query took. [servo]
+inline void tell(WorkMeter* work, const WorkCount& count) noexcept {
+  if (work != nullptr) work->add(count);
+}
 
 }  // namespace asperity

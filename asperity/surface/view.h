@@ -40,10 +40,6 @@ struct SurfaceCache {
   CellCache cells;
   SparseHint sparse;
   WorkMeter* work = nullptr;  ///< what queries tell what they took, in the caller's hands; none: nothing
-  /// [servo]
-  void took(const WorkCount& count) const noexcept {
-    if (work != nullptr) work->add(count);
-  }
 };
 
 /// The implicit function of a surface at a point: negative inside, zero on it, positive outside.

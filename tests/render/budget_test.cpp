@@ -5,7 +5,6 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <numbers>
@@ -174,11 +173,9 @@ TEST_P(Budget, ATickGoesOverByOneQueryOrTwo) {
   };
   const std::uint32_t all = dearest(0);
   const std::uint32_t kept = dearest(small_budget);
-  RecordProperty("unlimited", static_cast<int>(all));
-  RecordProperty("kept", static_cast<int>(kept));
-  std::printf("dearest tick: %u, of a budget of %u: %u\n", all, small_budget, kept);
-  EXPECT_LE(kept, std::max(all, small_budget));
-  EXPECT_LE(kept, 8 * small_budget);
+  // Less than it would be without one, and by single queries at most over it.
+  EXPECT_LT(kept, all);
+  EXPECT_LE(kept, 6 * small_budget);
 }
 
 TEST_P(Budget, ReplaysAreEqualWhateverCachesHold) {
@@ -198,14 +195,25 @@ TEST_P(Budget, ReplaysAreEqualWhateverCachesHold) {
   }
 }
 
+/// Slowly through a body, so that what jumps is the proxy, off ridges and round edges.
+std::vector<Vec3> slow_path(Rng& rng, std::size_t ticks, double stride) {
+  std::vector<Vec3> path;
+  Vec3 p(0.0, 0.0, 2.0 * size);
+  while (path.size() < ticks) {
+    const Vec3 goal = 0.95 * size * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    for (; (goal - p).norm() > stride && path.size() < ticks; path.push_back(p)) p += stride * (goal - p).normalized();
+  }
+  return path;
+}
+
 TEST_P(Budget, ItMakesNoJumpLarger) {
   Rng rng(14);
-  const auto path = fast_path(rng, 3000);
-  double fastest = 0.0;
-  for (std::size_t i = 1; i < path.size(); ++i) fastest = std::max(fastest, (path[i] - path[i - 1]).norm());
+  const double stride = 1e-4;  // m
+  const auto path = slow_path(rng, 6000, stride);
   const double without = largest_jump(slide(scene_of_kind(GetParam(), 0), path));
   const double with = largest_jump(slide(scene_of_kind(GetParam(), small_budget), path));
-  EXPECT_LE(with, without + stiffness * fastest);
+  EXPECT_GT(without, 2.0 * stiffness * stride);
+  EXPECT_LE(with, without + stiffness * stride);
 }
 
 RC_GTEST_PROP(BudgetInvariants, the_proxy_never_moves_away_from_the_probe, (std::uint64_t seed)) {

@@ -138,7 +138,7 @@ bool CustomSurface::land(Vec3& q, WorkMeter* asked) const noexcept {
   const double least = 1e-6 * facts_.lipschitz;
   for (int i = 0; i < most_landings; ++i) {
     const FieldSample here = eval(q);
-    if (asked != nullptr) asked->add({1, 0, 0});
+    tell(asked, {1, 0, 0});
     const double slope = here.gradient.norm();
     if (!(slope > least) || !std::isfinite(here.value)) return false;
     // Where the field is flat its slope says nothing of how far the surface is.

@@ -175,7 +175,7 @@ Foot CustomView::foot_at(const Vec3& p, const CustomSpot& spot) const noexcept {
 Foot CustomView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
   Foot best;
   if (surface_->queries().nearest != nullptr) {
-    took({1, 0, 0});
+    tell(work_, {1, 0, 0});
     best = surface_->queries().nearest(surface_->field(), p, bound);
     best.at = best.point;
     return best;
@@ -206,7 +206,7 @@ Foot CustomView::nearest(const Vec3& p, double bound, const Place& start) const 
 
 SweptHit CustomView::first_touch(const Segment& motion, Sides sides) const noexcept {
   if (surface_->queries().first_touch == nullptr) return trace(motion, sides);
-  took({1, 0, 0});
+  tell(work_, {1, 0, 0});
   SweptHit hit = surface_->queries().first_touch(surface_->field(), motion, sides);
   if (!hit.hit) return hit;
   hit.contact.at = hit.contact.point;

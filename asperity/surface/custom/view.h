@@ -41,7 +41,7 @@ class CustomView {
     return place.side() * eval(from).value >= 0.0;
   }
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept {
-    took({1, 0, 0});
+    tell(work_, {1, 0, 0});
     return surface_->eval(p);
   }
   /// CustomSurface::land.
@@ -56,10 +56,6 @@ class CustomView {
  private:
   [[nodiscard]] SweptHit trace(const Segment& motion, Sides sides) const noexcept;
   [[nodiscard]] Foot foot_at(const Vec3& p, const CustomSpot& spot) const noexcept;
-
-  void took(const WorkCount& count) const noexcept {
-    if (work_ != nullptr) work_->add(count);
-  }
 
   const CustomSurface* surface_;
   WorkMeter* work_;

@@ -385,7 +385,7 @@ class Leader {
 DescentEnd IsoView::descend(Place& place, IsoSpot& spot, const Goal& goal) const noexcept {
   Leader leader(*this, goal, place.side(), spot);
   const DescentEnd end = leader.run();
-  took({leader.moves(), 0, 0});
+  tell(work, {leader.moves(), 0, 0});
   if (!leader.normal().isZero()) spot.front = place.side() * leader.normal();
   place.at = spot.point;
   return end;

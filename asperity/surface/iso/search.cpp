@@ -108,7 +108,7 @@ class NearestSearch {
     // Downhill from the point itself: near a smooth surface that is all.
     lead(p_.cwiseMax(field.bounds().lower).cwiseMin(field.bounds().upper));
     visit(field.octree(surface_.level).root());
-    surface_.took({0, 0, cells_});
+    tell(surface_.work, {0, 0, cells_});
     return foot_;
   }
 
@@ -313,7 +313,7 @@ IsoCrossing IsoView::first_crossing(const Segment& motion, double from) const no
     }
     more = walk.next();
   }
-  took(count);
+  tell(work, count);
   return crossing;
 }
 

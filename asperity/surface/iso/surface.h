@@ -91,9 +91,6 @@ struct IsoView {
     return number == no_index ? 0 : number;
   }
   [[nodiscard]] std::uint32_t element_at(const Vec3& p) const noexcept { return element_of(field->cell_of(level, p)); }
-  void took(const WorkCount& count) const noexcept {
-    if (work != nullptr) work->add(count);
-  }
 };
 static_assert(SurfaceView<IsoView>);
 

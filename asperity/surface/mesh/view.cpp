@@ -127,7 +127,7 @@ DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal)
   FaceChart<FlatFaces> chart(faces, at, spot);
   Walk<FaceChart<FlatFaces>> walk(chart, goal, place.side());
   const DescentEnd end = walk.run();
-  cache_->took({walk.moves(), 0, chart.frames()});
+  tell(cache_->work, {walk.moves(), 0, chart.frames()});
   place.element = at.frame.face;
   place.at = {1.0 - at.u - at.v, at.u, at.v};
   return blocked ? DescentEnd::blocked : end;

@@ -1,6 +1,9 @@
 #pragma once
 // A triangle mesh as one tick touches it. Places are barycentric.
 
+#include <algorithm>
+#include <cstdint>
+
 #include "asperity/surface/face_chart.h"
 #include "asperity/surface/mesh/surface.h"
 
@@ -15,18 +18,18 @@ class TriangleView {
 
   /// First touch of a ball moving along a segment.
   [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides) const noexcept {
-    cache_->took(one_query);
+    tell(cache_->work, one_sweep(motion));
     return surface_->index().sweep(motion, radius, sides, cache_->patch);
   }
   [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
   /// Every plane that a ball touches where it rests: what a constraint solve needs at once. (One that only knew the
   /// last hit could not rest in a corner without finding the other walls again by moving.)
   void contacts(const Vec3& position, double radius, Sides sides, ContactSet& out) const noexcept {
-    cache_->took(one_query);
+    tell(cache_->work, one_query);
     surface_->index().contacts(position, radius, sides, cache_->patch, out);
   }
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& = {}) const noexcept {
-    cache_->took(one_query);
+    tell(cache_->work, one_query);
     return surface_->index().closest(p, bound, cache_->patch);
   }
   [[nodiscard]] FlatSpot at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
@@ -57,6 +60,12 @@ class TriangleView {
  private:
   /// How many triangles it looks at hangs on what the cache holds.
   static constexpr WorkCount one_query{0, 0, 1};
+  /// About as many as it is edges long.
+  [[nodiscard]] WorkCount one_sweep(const Segment& motion) const noexcept {
+    constexpr double most = 1000.0;
+    const double edges = (motion.to - motion.from).norm() / grain();
+    return {0, 0, 1 + static_cast<std::uint32_t>(std::min(edges, most))};
+  }
 
   const MeshSurface* surface_;
   SurfaceCache* cache_;

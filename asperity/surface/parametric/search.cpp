@@ -418,7 +418,7 @@ Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) co
   Nearest search(*surface_, p, bound, work_);
   if (start.known()) search.take(surface_->within_range(start.at.head<2>()));
   search.run(surface_->patches_);
-  took(search.count());
+  tell(work_, search.count());
   if (!search.found) return foot;
   foot.point = search.spot.point;
   foot.distance = search.distance();
@@ -432,7 +432,7 @@ Foot ParametricView::nearest(const Vec3& p, double bound, const Place& start) co
 SweptHit ParametricView::first_touch(const Segment& motion, Sides sides) const noexcept {
   Crossing crossing(*surface_, motion, sides);
   crossing.run(surface_->patches_);
-  took(crossing.count());
+  tell(work_, crossing.count());
   if (!crossing.found) return {};
   const ParametricSpot there = spot(crossing.uv);
   const double side = there.front.dot(motion.to - motion.from) > 0.0 ? -1.0 : 1.0;

@@ -145,7 +145,7 @@ DescentEnd ParametricView::descend(Place& place, ParametricSpot& spot, const Goa
   ParameterChart chart(*this, uv, spot);
   Walk<ParameterChart> walk(chart, goal, place.side());
   const DescentEnd end = walk.run();
-  took({walk.moves(), 0, 0});
+  tell(work_, {walk.moves(), 0, 0});
   place.at = {uv.x(), uv.y(), 0.0};
   return end;
 }

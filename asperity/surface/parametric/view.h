@@ -57,10 +57,6 @@ class ParametricView {
   [[nodiscard]] const ParametricSurface& surface() const noexcept { return *surface_; }
 
  private:
-  void took(const WorkCount& count) const noexcept {
-    if (work_ != nullptr) work_->add(count);
-  }
-
   const ParametricSurface* surface_;
   WorkMeter* work_;
 };

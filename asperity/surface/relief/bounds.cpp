@@ -118,20 +118,6 @@ bool ReliefSurface::reaches_band(const ReliefFrame& frame, const FacePart& part)
   return false;
 }
 
-HeightForm ReliefSurface::stitched_range(const ReliefFrame& frame, const FacePart& part) const noexcept {
-  // On more than this of a face `range` asks for all that the faces around have anywhere: no less than the face's own.
-  constexpr double small = 0.06;
-  if (!frame.lowered && std::max(part.spread(1.0, 0.0), part.spread(0.0, 1.0)) > small) {
-    const HeightRange own = range(frame.face);
-    if (std::isfinite(own.highest)) return HeightForm::level(own.lowest, own.highest);
-  }
-  // Before it is lowered.
-  ReliefFrame whole = frame;
-  whole.lowered = false;
-  const HeightRange all = range_around(whole, part);
-  return HeightForm::level(all.lowest, all.highest);
-}
-
 HeightForm ReliefSurface::stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept {
   constexpr std::size_t most_faces = 24;
   const Stitching& stitching = coat_.settings().stitching;
@@ -177,7 +163,11 @@ HeightForm ReliefSurface::stitched_form(const ReliefFrame& frame, const FacePart
   }
   if (all_there && count == 1) return heights[0];
   if (all_there && normalise({weights, count}, part)) return mixed({heights, count}, {weights, count}, part);
-  return stitched_range(frame, part);
+  // Before it is lowered.
+  ReliefFrame whole = frame;
+  whole.lowered = false;
+  const HeightRange all = range_around(whole, part);
+  return HeightForm::level(all.lowest, all.highest);
 }
 
 ReliefBound ReliefSurface::bound(const ReliefFrame& frame, const FacePart& part) const noexcept {

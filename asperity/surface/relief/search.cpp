@@ -622,7 +622,7 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
     }
     return best.t;
   });
-  cache_->took(count);
+  tell(cache_->work, count);
   if (!best.hit) return best;
   const ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
   best.contact = foot_at(place, spot, motion.from);
@@ -663,7 +663,7 @@ Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const 
     search.visit(face);
     return search.distance();
   });
-  cache_->took(search.count());
+  tell(cache_->work, search.count());
   if (!search.found()) return {};
   cache_->relief = {search.place(), search.spot(), true};
   return foot_at(search.place(), search.spot(), p);

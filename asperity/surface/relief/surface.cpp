@@ -206,7 +206,7 @@ std::vector<Box> ReliefSurface::enclose(std::span<RoundedSlab> slabs) {
   const TriangleMesh& mesh = base_.mesh();
   const std::size_t faces = mesh.triangles().size();
   std::vector<Box> boxes(faces);
-  ranges_.assign(faces, {});  // nothing is known of any face yet
+  ranges_.assign(faces, {});
   const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
   const bool anything = any_height();
   const std::vector<CarriedHeight>& carried = carried_->heights;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -198,7 +197,6 @@ class ReliefSurface {
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
-  [[nodiscard]] HeightForm stitched_range(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightForm stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightRange range_around(const ReliefFrame& frame, const FacePart& part) const noexcept;
   template <class Visit>
@@ -217,8 +215,8 @@ class ReliefSurface {
   std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
   std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
   struct FaceRange {
-    float lowest = -std::numeric_limits<float>::infinity();
-    float highest = std::numeric_limits<float>::infinity();
+    float lowest = 0.0F;
+    float highest = 0.0F;
   };
   std::vector<FaceRange> ranges_;  ///< one a face, rounded outwards
   FaceBoxes boxes_;

@@ -133,7 +133,7 @@ DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal
   cache.place.v = place.at[2];
   WorkCount count;
   const DescentEnd end = asperity::descend(*surface_, cache.place, spot, place.side(), goal, count);
-  cache_->took(count);
+  tell(cache_->work, count);
   cache.spot = spot;
   cache.evaluated = true;
   place.element = cache.place.frame.face;
