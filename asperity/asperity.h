@@ -82,6 +82,7 @@
 #include "asperity/surface/face_place.h"
 #include "asperity/surface/feature_mapping.h"
 #include "asperity/surface/height_form.h"
+#include "asperity/surface/height_jet.h"
 #include "asperity/surface/implicit/surface.h"
 #include "asperity/surface/implicit/texture.h"
 #include "asperity/surface/iso/surface.h"

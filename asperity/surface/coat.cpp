@@ -130,18 +130,13 @@ void mark_uv_seams(const TriangleMesh& mesh, const CoatSettings& settings, bool 
   }
 }
 
-void add(HeightJet& sum, const HeightJet& more) noexcept {
-  sum.height += more.height;
-  sum.u += more.u;
-  sum.v += more.v;
-  sum.uu += more.uu;
-  sum.uv += more.uv;
-  sum.vv += more.vv;
-}
-
-/// Second derivative of a map along two steps of its texture coordinates.
-double second_along(const HeightCurvature& map, const Vec2& a, const Vec2& b) noexcept {
-  return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
+/// What a map says, by u and v along which its texture coordinates change so.
+HeightJet along(const HeightCurvature& map, const Vec2& st_u, const Vec2& st_v) noexcept {
+  const auto second = [&](const Vec2& a, const Vec2& b) {
+    return map.ss * a.x() * b.x() + map.st * (a.x() * b.y() + a.y() * b.x()) + map.tt * a.y() * b.y();
+  };
+  return {map.height,         map.gradient.dot(st_u), map.gradient.dot(st_v),
+          second(st_u, st_u), second(st_u, st_v),     second(st_v, st_v)};
 }
 
 }  // namespace
@@ -362,7 +357,7 @@ HeightJet Coat::layered_jet(const CoatFrame& frame, double u, double v) const no
     } else {
       more = own_jet(layer_frame(frame, layer), u, v);
     }
-    add(sum, more);
+    sum.add(more);
   }
   return sum;
 }
@@ -387,12 +382,7 @@ double Coat::own_height(const CoatFrame& frame, double u, double v) const noexce
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
   if (frame.triplanar) return triplanar_jet(frame, u, v);
   const HeightCurvature map = frame.maps->curvature(frame.st + u * frame.st_u + v * frame.st_v, frame.level);
-  return {map.height,
-          map.gradient.dot(frame.st_u),
-          map.gradient.dot(frame.st_v),
-          second_along(map, frame.st_u, frame.st_u),
-          second_along(map, frame.st_u, frame.st_v),
-          second_along(map, frame.st_v, frame.st_v)};
+  return along(map, frame.st_u, frame.st_v);
 }
 
 HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept {
@@ -425,25 +415,10 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
     const HeightCurvature map = frame.maps->curvature(seen_along(axis, point, tile), frame.level);
     const Vec2 st_u = seen_along(axis, frame.point_u, tile);
     const Vec2 st_v = seen_along(axis, frame.point_v, tile);
-    const double hu = map.gradient.dot(st_u);
-    const double hv = map.gradient.dot(st_v);
-    sum.height += w * map.height;
-    sum.u += own.u * map.height + w * hu;
-    sum.v += own.v * map.height + w * hv;
-    sum.uu += own.uu * map.height + 2.0 * own.u * hu + w * second_along(map, st_u, st_u);
-    sum.uv += own.uv * map.height + own.u * hv + own.v * hu + w * second_along(map, st_u, st_v);
-    sum.vv += own.vv * map.height + 2.0 * own.v * hv + w * second_along(map, st_v, st_v);
-    add(weight, own);
+    sum.add(product(own, along(map, st_u, st_v)));
+    weight.add(own);
   }
-  const double per = 1.0 / std::max(weight.height, std::numeric_limits<double>::min());
-  HeightJet jet;
-  jet.height = sum.height * per;
-  jet.u = (sum.u - jet.height * weight.u) * per;
-  jet.v = (sum.v - jet.height * weight.v) * per;
-  jet.uu = (sum.uu - 2.0 * jet.u * weight.u - jet.height * weight.uu) * per;
-  jet.uv = (sum.uv - jet.u * weight.v - jet.v * weight.u - jet.height * weight.uv) * per;
-  jet.vv = (sum.vv - 2.0 * jet.v * weight.v - jet.height * weight.vv) * per;
-  return jet;
+  return quotient(sum, weight, 1.0 / std::max(weight.height, std::numeric_limits<double>::min()));
 }
 
 CoatSample Coat::sample(const TriangleMesh& mesh, std::uint32_t face, const Vec3& barycentric,

@@ -9,6 +9,7 @@
 #include "asperity/field/mesostructure/solid.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/surface/height_form.h"
+#include "asperity/surface/height_jet.h"
 #include "asperity/surface/material_maps.h"
 #include "asperity/surface/stitching.h"
 
@@ -64,16 +65,6 @@ struct CoatSample {
   Vec3 gradient = Vec3::Zero();  ///< surface gradient of H in the triangle's plane (m/m)
   Vec3 normal =
       Vec3::Zero();  ///< unit normal of the relief: the given normal map's where there is one, else from `gradient`
-};
-
-/// Height over one triangle as a function of its barycentric coordinates (u, v) of the second and third corner.
-struct HeightJet {
-  double height;  ///< m
-  double u;       ///< dH/du (m)
-  double v;
-  double uu;  ///< second derivatives (m)
-  double uv;
-  double vv;
 };
 
 /// The mapping of one triangle, ready to be sampled: what a probe that stays on it need not fetch again.

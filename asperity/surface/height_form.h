@@ -111,6 +111,21 @@ inline bool normalise(std::span<WeightForm> weights, const FacePart& part) noexc
   return true;
 }
 
+/// Of a mean of heights by any weights that sum to 1. [servo]
+inline HeightForm between(std::span<const HeightForm> heights, const FacePart& part) noexcept {
+  const double share = 1.0 / static_cast<double>(heights.size());
+  HeightForm mean;
+  for (const HeightForm& one : heights) {
+    mean.height += share * one.height;
+    mean.u += share * one.u;
+    mean.v += share * one.v;
+  }
+  for (const HeightForm& one : heights)
+    mean.error = std::max(mean.error,
+                          std::abs(one.height - mean.height) + part.spread(one.u - mean.u, one.v - mean.v) + one.error);
+  return mean;
+}
+
 /// The mean of heights by weights that sum to 1. [servo]
 inline HeightForm mixed(std::span<const HeightForm> heights, std::span<const WeightForm> weights,
                         const FacePart& part) noexcept {

@@ -188,7 +188,8 @@ void relax(const TriangleMesh& mesh, const std::vector<std::vector<WeightedNorma
 
 bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
   constexpr int most_steps = 16;
-  double last = infinity;
+  // The next step would be as small against this one as this one is: below rounding.
+  constexpr double enough = 1e-8;
   for (int i = 0; i < most_steps; ++i) {
     const Vec3 du = edge_u + place.height * turn_u;
     const Vec3 dv = edge_v + place.height * turn_v;
@@ -197,18 +198,23 @@ bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
     const Vec3 across = du.cross(dv);
     const double det = across.dot(dh);
     if (!(std::abs(det) > 0.0)) return false;
+    const double per = 1.0 / det;
     const Vec3 turned = rest.cross(dh);
-    const double step_u = -dv.dot(turned) / det;
-    const double step_v = du.dot(turned) / det;
-    const double step_h = across.dot(rest) / det;
+    const double step_u = -dv.dot(turned) * per;
+    const double step_v = du.dot(turned) * per;
+    const double step_h = across.dot(rest) * per;
     place.u += step_u;
     place.v += step_v;
     place.height += step_h;
-    // In u and v an edge is 1; heights are measured by the triangle's size.
-    const double change = std::abs(step_u) + std::abs(step_v) + std::abs(step_h) / std::sqrt(across.norm());
-    if (!(change < 1e6)) return false;
-    if (change <= 1e-13 || (change <= 1e-6 && change >= last)) return determinant(place) > 0.0;
-    last = change;
+    // In u and v an edge is 1; heights are measured by the triangle's size, the root of its area.
+    const double plane = std::abs(step_u) + std::abs(step_v);
+    const double area = across.squaredNorm();
+    const double square = step_h * step_h;
+    const auto within = [&](double size) {
+      return plane <= size && square * square <= area * (size * size) * (size * size);
+    };
+    if (within(enough)) return determinant(place) > 0.0;
+    if (!within(1e6)) return false;
   }
   return false;
 }

@@ -102,20 +102,24 @@ Status validate(const Stitching& stitching) {
 }
 
 BlendValue blend_value(const Stitching& stitching, double rho, double barycentric) noexcept {
-  if (stitching.blend == Blend::none || rho <= 0.0) return {barycentric >= 0.0 ? 1.0 : 0.0, 0.0};
+  if (stitching.blend == Blend::none || rho <= 0.0) return {barycentric >= 0.0 ? 1.0 : 0.0, 0.0, 0.0};
   const double per = 1.0 / (2.0 * rho);
   const double t = std::clamp((barycentric + rho) * per, 0.0, 1.0);
   const bool within = t > 0.0 && t < 1.0;
   switch (stitching.blend) {
-    case Blend::linear: return {t, within ? per : 0.0};
-    case Blend::s_shape: return {t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * per};
-    case Blend::quintic: return {t * t * t * (10.0 + t * (6.0 * t - 15.0)), 30.0 * t * t * (1.0 - t) * (1.0 - t) * per};
+    case Blend::linear: return {t, within ? per : 0.0, 0.0};
+    case Blend::s_shape:
+      return {t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * per, within ? (6.0 - 12.0 * t) * per * per : 0.0};
+    case Blend::quintic:
+      return {t * t * t * (10.0 + t * (6.0 * t - 15.0)), 30.0 * t * t * (1.0 - t) * (1.0 - t) * per,
+              60.0 * t * (1.0 - t) * (1.0 - 2.0 * t) * per * per};
     default: break;
   }
   const auto last = static_cast<double>(stitching.blend_map.size() - 1);
   const auto cell = static_cast<std::size_t>(std::min(t * last, last - 1.0));
   const double rise = stitching.blend_map[cell + 1] - stitching.blend_map[cell];
-  return {stitching.blend_map[cell] + (t * last - static_cast<double>(cell)) * rise, within ? rise * last * per : 0.0};
+  return {stitching.blend_map[cell] + (t * last - static_cast<double>(cell)) * rise, within ? rise * last * per : 0.0,
+          0.0};
 }
 
 std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shell, double rho) {

@@ -58,13 +58,14 @@ struct Stitching {
 /// Errors: bad_value naming the member and what would be accepted. [build]
 Status validate(const Stitching& stitching);
 
-/// A weight and its derivative.
+/// A weight and its first two derivatives.
 struct BlendValue {
   double weight = 1.0;
   double slope = 0.0;
+  double bend = 0.0;
 };
 /// Weight of a barycentric coordinate in a band of half width `rho`: the blend at t = (b + rho) / (2 rho), with its
-/// derivative by b (erratum 3). [servo]
+/// derivatives by b (erratum 3). [servo]
 BlendValue blend_value(const Stitching& stitching, double rho, double barycentric) noexcept;
 
 /// Where on one face other faces have a say.

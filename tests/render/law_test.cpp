@@ -128,6 +128,8 @@ RC_GTEST_PROP(BlendWeights, slopes_agree_with_finite_differences, (std::uint64_t
     const double slope =
         (blend_value(law, law.rho, b + h).weight - blend_value(law, law.rho, b - h).weight) / (2.0 * h);
     RC_ASSERT(std::abs(slope - blend_value(law, law.rho, b).slope) <= 1e-6 / law.rho);
+    const double bend = (blend_value(law, law.rho, b + h).slope - blend_value(law, law.rho, b - h).slope) / (2.0 * h);
+    RC_ASSERT(std::abs(bend - blend_value(law, law.rho, b).bend) <= 1e-6 / (law.rho * law.rho));
   }
 }
 

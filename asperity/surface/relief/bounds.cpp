@@ -163,6 +163,8 @@ HeightForm ReliefSurface::stitched_form(const ReliefFrame& frame, const FacePart
   }
   if (all_there && count == 1) return heights[0];
   if (all_there && normalise({weights, count}, part)) return mixed({heights, count}, {weights, count}, part);
+  // Whatever the weights are they keep between the heights.
+  if (all_there) return between({heights, count}, part);
   // Before it is lowered.
   ReliefFrame whole = frame;
   whole.lowered = false;

@@ -241,16 +241,16 @@ FieldSample ReliefSurface::round_field(const ReliefFrame& frame, const ShellPlac
   Vec3 weight_gradient = Vec3::Zero();
   Vec3 value_gradient = Vec3::Zero();
   const auto add = [&](const ReliefFrame& one, const ShellPlace& at) {
-    const PlaceWeight weight = place_weight(stitching, one.band, at.u, at.v);
-    if (weight.weight <= 0.0) return;
+    const HeightJet weight = place_weight(stitching, one.band, at.u, at.v);
+    if (weight.height <= 0.0) return;
     const FieldSample own = own_field(one, at);
     const ShellGradients gradients = shell_gradients(one.prism, at);
     const Vec3 slope = weight.u * gradients.u + weight.v * gradients.v;
-    weights += weight.weight;
-    values += weight.weight * own.value;
-    heights += weight.weight * own.height;
+    weights += weight.height;
+    values += weight.height * own.value;
+    heights += weight.height * own.height;
     weight_gradient += slope;
-    value_gradient += own.value * slope + weight.weight * own.gradient;
+    value_gradient += own.value * slope + weight.height * own.gradient;
   };
   add(frame, place);
   for_each_partner(frame, place.u, place.v, [&](std::uint32_t other) {

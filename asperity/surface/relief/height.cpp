@@ -35,56 +35,24 @@ HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) co
 HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) const noexcept {
   const Stitching& stitching = coat_.settings().stitching;
   const TriangleMesh& mesh = base_.mesh();
-  const PlaceWeight own = place_weight(stitching, frame.band, u, v);
-  const HeightJet jet = coat_.jet(frame.coat, u, v);
-  const double seam = frame.seam + u * frame.seam_u + v * frame.seam_v;
-  PlaceWeight total = own;
-  HeightJet sum{own.weight * jet.height,
-                own.u * jet.height + own.weight * jet.u,
-                own.v * jet.height + own.weight * jet.v,
-                own.weight * jet.uu + 2.0 * own.u * jet.u,
-                own.weight * jet.uv + own.u * jet.v + own.v * jet.u,
-                own.weight * jet.vv + 2.0 * own.v * jet.v};
+  HeightJet weights = place_weight(stitching, frame.band, u, v);
+  HeightJet sum = product(weights, coat_.jet(frame.coat, u, v));
+  const HeightJet seam{frame.seam + u * frame.seam_u + v * frame.seam_v, frame.seam_u, frame.seam_v, 0.0, 0.0, 0.0};
   for_each_partner(frame, u, v, [&](std::uint32_t other) {
     const ShellPrism prism = shell_.prism(mesh, other);
     const ProjectedPlace place = project_place(frame.prism, u, v, prism);
     if (!place.seen || !has_say(bands_[other], place.u, place.v)) return;
+    const HeightJet own = place_weight(stitching, bands_[other], place.u, place.v);
+    if (own.height <= 0.0) return;
     const Projection at = with_changes(place, frame.prism);
-    PlaceWeight there = place_weight(stitching, bands_[other], at.u, at.v);
-    if (there.weight <= 0.0) return;
-    const HeightJet heights = coat_.jet(coat_.frame(rest_.mesh(), other, frame.coat.moment), at.u, at.v);
-    double weight_u = there.u * at.by_u.x() + there.v * at.by_u.y();
-    double weight_v = there.u * at.by_v.x() + there.v * at.by_v.y();
-    if (frame.partly) {
-      weight_u = seam * weight_u + frame.seam_u * there.weight;
-      weight_v = seam * weight_v + frame.seam_v * there.weight;
-      there.weight *= seam;
-    }
-    const double height_u = heights.u * at.by_u.x() + heights.v * at.by_u.y();
-    const double height_v = heights.u * at.by_v.x() + heights.v * at.by_v.y();
-    const auto second = [&](const Vec2& a, const Vec2& b) {
-      return heights.uu * a.x() * b.x() + heights.uv * (a.x() * b.y() + a.y() * b.x()) + heights.vv * a.y() * b.y();
-    };
-    total.weight += there.weight;
-    total.u += weight_u;
-    total.v += weight_v;
-    sum.height += there.weight * heights.height;
-    sum.u += weight_u * heights.height + there.weight * height_u;
-    sum.v += weight_v * heights.height + there.weight * height_v;
-    sum.uu += there.weight * second(at.by_u, at.by_u) + 2.0 * weight_u * height_u;
-    sum.uv += there.weight * second(at.by_u, at.by_v) + weight_u * height_v + weight_v * height_u;
-    sum.vv += there.weight * second(at.by_v, at.by_v) + 2.0 * weight_v * height_v;
+    const ProjectionBend bend = bend_of(place, frame.prism);
+    HeightJet weight = seen_from(own, at, bend);
+    if (frame.partly) weight = product(seam, weight);
+    const HeightJet there = coat_.jet(coat_.frame(rest_.mesh(), other, frame.coat.moment), at.u, at.v);
+    weights.add(weight);
+    sum.add(product(weight, seen_from(there, at, bend)));
   });
-  // The second derivatives leave out those of the weights and of the projection: they guide steps, forces never see
-  // them.
-  const double per = 1.0 / total.weight;
-  HeightJet blended;
-  blended.height = sum.height * per;
-  blended.u = (sum.u - blended.height * total.u) * per;
-  blended.v = (sum.v - blended.height * total.v) * per;
-  blended.uu = (sum.uu - 2.0 * blended.u * total.u) * per;
-  blended.uv = (sum.uv - blended.u * total.v - blended.v * total.u) * per;
-  blended.vv = (sum.vv - 2.0 * blended.v * total.v) * per;
+  HeightJet blended = quotient(sum, weights, 1.0 / weights.height);
   lower_by_share(frame, u, v, blended);
   return blended;
 }

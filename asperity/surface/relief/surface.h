@@ -97,6 +97,8 @@ class ReliefSurface {
   }
   /// Height as rendered over a place of the frame's triangle. [servo]
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// That height alone (m), to within rounding: where no neighbour has a say, in half the time. [servo]
+  [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   /// Heights that are asked for there, about: the face's own, and in a band those of the faces around. [servo]
   [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
     constexpr std::uint32_t in_a_band = 4;
@@ -116,7 +118,7 @@ class ReliefSurface {
     if (size > 0.0) spot.front /= size;
     return spot;
   }
-  /// That point alone (m), to within rounding: where no neighbour has a say, in half the time. [servo]
+  /// That point alone (m), likewise. [servo]
   [[nodiscard]] Vec3 place(const ReliefFrame& frame, double u, double v) const noexcept {
     return frame.prism.base_at(u, v) + height_alone(frame, u, v) * frame.prism.direction_at(u, v);
   }
@@ -190,7 +192,6 @@ class ReliefSurface {
   [[nodiscard]] bool on_its_own(std::uint32_t face) const noexcept;
   [[nodiscard]] std::vector<Box> enclose(std::span<RoundedSlab> slabs);
   void find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs);
-  [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "asperity/surface/height_jet.h"
 #include "asperity/surface/relief/frame.h"
 #include "asperity/surface/stitching.h"
 
@@ -13,20 +14,22 @@ inline double coordinate(int k, double u, double v) noexcept {
   return k == 0 ? 1.0 - u - v : (k == 1 ? u : v);
 }
 
-/// Product of the blends of the three coordinates, with its derivatives along u and v.
-struct PlaceWeight {
-  double weight = 0.0;
-  double u = 0.0;
-  double v = 0.0;
-};
-
-/// Of a face at a place in its coordinates. [servo]
-inline PlaceWeight place_weight(const Stitching& stitching, const StitchBand& band, double u, double v) noexcept {
+/// Weight of a face at a place in its coordinates: the product of the blends of the three. [servo]
+inline HeightJet place_weight(const Stitching& stitching, const StitchBand& band, double u, double v) noexcept {
   BlendValue one[3];
   for (int k = 0; k < 3; ++k) one[k] = blend_value(stitching, static_cast<double>(band.rho[k]), coordinate(k, u, v));
   const double by[3] = {one[0].slope * one[1].weight * one[2].weight, one[0].weight * one[1].slope * one[2].weight,
                         one[0].weight * one[1].weight * one[2].slope};
-  return {one[0].weight * one[1].weight * one[2].weight, by[1] - by[0], by[2] - by[0]};
+  const double by_00 = one[0].bend * one[1].weight * one[2].weight;
+  const double by_01 = one[0].slope * one[1].slope * one[2].weight;
+  const double by_02 = one[0].slope * one[1].weight * one[2].slope;
+  const double by_12 = one[0].weight * one[1].slope * one[2].slope;
+  return {one[0].weight * one[1].weight * one[2].weight,
+          by[1] - by[0],
+          by[2] - by[0],
+          by_00 - 2.0 * by_01 + one[0].weight * one[1].bend * one[2].weight,
+          by_00 - by_01 - by_02 + by_12,
+          by_00 - 2.0 * by_02 + one[0].weight * one[1].weight * one[2].bend};
 }
 
 /// Where a place of one triangle lies on another one's plane, seen along the place's own direction, and how that
@@ -88,6 +91,42 @@ inline Projection with_changes(const ProjectedPlace& place, const ShellPrism& fr
   answer.by_u = change(from.edge_u, from.turn_u);
   answer.by_v = change(from.edge_v, from.turn_v);
   return answer;
+}
+
+/// How the changes themselves change along u and v.
+struct ProjectionBend {
+  Vec2 uu = Vec2::Zero();
+  Vec2 uv = Vec2::Zero();
+  Vec2 vv = Vec2::Zero();
+};
+
+/// Of a place that is seen: rise times facing is linear in u and v. [servo]
+inline ProjectionBend bend_of(const ProjectedPlace& place, const ShellPrism& from) noexcept {
+  const double facing_u = place.cross.dot(from.turn_u) / place.facing;
+  const double facing_v = place.cross.dot(from.turn_v) / place.facing;
+  const double rise_u = -place.cross.dot(from.edge_u) / place.facing - place.rise * facing_u;
+  const double rise_v = -place.cross.dot(from.edge_v) / place.facing - place.rise * facing_v;
+  const auto within = [&](const Vec3& moved) { return Vec2(place.gradient_u.dot(moved), place.gradient_v.dot(moved)); };
+  const Vec2 turn_u = within(from.turn_u);
+  const Vec2 turn_v = within(from.turn_v);
+  const Vec2 direction = within(place.direction);
+  return {2.0 * rise_u * (turn_u - facing_u * direction),
+          rise_u * (turn_v - facing_v * direction) + rise_v * (turn_u - facing_u * direction),
+          2.0 * rise_v * (turn_v - facing_v * direction)};
+}
+
+/// What the other face has at a place, by the first one's coordinates. [servo]
+inline HeightJet seen_from(const HeightJet& there, const Projection& at, const ProjectionBend& bend) noexcept {
+  const auto first = [&](const Vec2& a) { return there.u * a.x() + there.v * a.y(); };
+  const auto second = [&](const Vec2& a, const Vec2& b) {
+    return there.uu * a.x() * b.x() + there.uv * (a.x() * b.y() + a.y() * b.x()) + there.vv * a.y() * b.y();
+  };
+  return {there.height,
+          first(at.by_u),
+          first(at.by_v),
+          second(at.by_u, at.by_u) + first(bend.uu),
+          second(at.by_u, at.by_v) + first(bend.uv),
+          second(at.by_v, at.by_v) + first(bend.vv)};
 }
 
 /// [servo]

@@ -1,89 +1,13 @@
-// Where a motion first meets a displaced surface, and which of its points is nearest: both by splitting triangles.
+// Where a motion first meets a displaced surface: face by face, along the curve that it is in the shell's coordinates.
 
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/geometry/closest_point.h"
-#include "asperity/surface/relief/view.h"
+#include "asperity/surface/relief/detail/search.h"
 
 namespace asperity {
 
 namespace {
-
-// Triangles are split until they are this small against a texel: the surface over one is then nearly a plane.
-constexpr double leaf_of_texel = 0.5;
-constexpr int deepest = 18;
-constexpr int stack_capacity = 4 * deepest + 8;
-
-/// Part of a triangle: three corners in its barycentric (u, v).
-struct Part {
-  Vec2 corner[3];
-  int level = 0;
-  double key = 0.0;
-  double radius = 0.0;  ///< of a ball around its relief (m)
-};
-
-void split(const Part& part, Part out[4]) noexcept {
-  const Vec2 middle[3] = {0.5 * (part.corner[1] + part.corner[2]), 0.5 * (part.corner[2] + part.corner[0]),
-                          0.5 * (part.corner[0] + part.corner[1])};
-  for (int k = 0; k < 3; ++k) {
-    out[k] = part;
-    out[k].corner[(k + 1) % 3] = middle[(k + 2) % 3];
-    out[k].corner[(k + 2) % 3] = middle[(k + 1) % 3];
-  }
-  out[3] = part;
-  for (int k = 0; k < 3; ++k) out[3].corner[k] = middle[k];
-  for (int k = 0; k < 4; ++k) out[k].level = part.level + 1;
-}
-
-Part whole() noexcept {
-  Part part;
-  part.corner[0] = Vec2(0.0, 0.0);
-  part.corner[1] = Vec2(1.0, 0.0);
-  part.corner[2] = Vec2(0.0, 1.0);
-  return part;
-}
-
-/// How often a triangle has to be split to be as small as a leaf.
-int leaf_level(const ReliefFrame& frame) noexcept {
-  const HeightMap& map = frame.coat.maps->heights();
-  double texels = 0.0;
-  if (frame.coat.triplanar) {
-    const Vec2& tile = frame.coat.maps->tile();
-    const double per = std::max(map.width() / tile.x(), map.height() / tile.y());
-    texels = per * std::max({frame.coat.point_u.cwiseAbs().maxCoeff(), frame.coat.point_v.cwiseAbs().maxCoeff(),
-                             (frame.coat.point_u - frame.coat.point_v).cwiseAbs().maxCoeff()});
-  } else {
-    const auto span = [&](const Vec2& st) {
-      return std::max(std::abs(st.x()) * map.width(), std::abs(st.y()) * map.height());
-    };
-    texels = std::max({span(frame.coat.st_u), span(frame.coat.st_v), span(frame.coat.st_u - frame.coat.st_v)});
-  }
-  int level = 0;
-  while (level < deepest && texels > leaf_of_texel) {
-    texels *= 0.5;
-    ++level;
-  }
-  // Even the flattest map is bent where faces are joined.
-  return std::max(level, frame.stitched ? 5 : 2);
-}
-
-/// The triangle's own affine frame: barycentric (u, v) of the projection, height over the plane.
-struct PlaneFrame {
-  Vec3 gradient_u;
-  Vec3 gradient_v;
-  Vec3 normal;
-  explicit PlaneFrame(const ShellPrism& prism) noexcept {
-    const Vec3 cross = prism.edge_u.cross(prism.edge_v);
-    const double area = cross.squaredNorm();
-    gradient_u = prism.edge_v.cross(cross) / area;
-    gradient_v = cross.cross(prism.edge_u) / area;
-    normal = cross / std::sqrt(area);
-  }
-  [[nodiscard]] Vec3 turned(const Vec3& vector) const noexcept {
-    return {gradient_u.dot(vector), gradient_v.dot(vector), normal.dot(vector)};
-  }
-};
 
 /// Cuts [from, to] down to where start + t rate lies within [low, high].
 bool cut(double start, double rate, double low, double high, double& from, double& to) noexcept {
@@ -166,17 +90,22 @@ class PatchRay {
 
   PatchHit first() noexcept {
     PatchHit best;
-    Piece stack[deepest + 2];
+    Piece stack[deepest_part + 2];
     int top = 0;
     stack[top++] = {at(part_.from, guess(part_.from)), at(part_.to, guess(part_.to)), 0};
     while (top > 0) {
-      const Piece piece = stack[--top];
-      if (passed_over(piece)) continue;
+      Piece piece = stack[--top];
+      Share share;
+      if (passed_over(piece, share)) continue;
       if (is_leaf(piece)) {
         if (solve(piece, best)) return best;
         continue;
       }
-      const Moment middle = halfway(piece);
+      if (cut_to(share, piece)) {
+        stack[top++] = piece;
+        continue;
+      }
+      const Moment middle = halfway(piece, share.bulge);
       // The earlier half first.
       stack[top++] = {middle, piece.to, piece.level + 1};
       stack[top++] = {piece.from, middle, piece.level + 1};
@@ -198,6 +127,13 @@ class PatchRay {
     int level = 0;
   };
 
+  /// The part of a piece that may meet the relief, and by how much the curve is off its chord in the middle.
+  struct Share {
+    double from = 0.0;
+    double to = 1.0;
+    ShellPlace bulge;
+  };
+
   /// As if directions were the plane's normal.
   [[nodiscard]] ShellPlace guess(double t) const noexcept {
     const Vec3 there = part_.start + t * part_.rate;
@@ -210,29 +146,50 @@ class PatchRay {
     return moment;
   }
 
-  [[nodiscard]] Moment halfway(const Piece& piece) const noexcept {
+  /// Where the curve over a piece is, `share` of the way along it.
+  [[nodiscard]] Moment within(const Piece& piece, double share, const ShellPlace& bulge) const noexcept {
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
+    const double off = share * (1.0 - share);
+    return at(piece.from.t + share * (piece.to.t - piece.from.t),
+              {a.u + share * (b.u - a.u) + off * bulge.u, a.v + share * (b.v - a.v) + off * bulge.v,
+               a.height + share * (b.height - a.height) + off * bulge.height});
+  }
+
+  [[nodiscard]] Moment halfway(const Piece& piece, const ShellPlace& bulge) const noexcept {
     const double t = 0.5 * (piece.from.t + piece.to.t);
     if (!piece.from.reached || !piece.to.reached) {
       const Moment middle = at(t, guess(t));
       if (middle.reached || (!piece.from.reached && !piece.to.reached)) return middle;
       return at(t, piece.from.reached ? piece.from.place : piece.to.place);
     }
-    const ShellPlace& a = piece.from.place;
-    const ShellPlace& b = piece.to.place;
-    const Moment middle = at(t, {0.5 * (a.u + b.u), 0.5 * (a.v + b.v), 0.5 * (a.height + b.height)});
-    return middle.reached ? middle : at(t, a);
+    const Moment middle = within(piece, 0.5, bulge);
+    return middle.reached ? middle : at(t, piece.from.place);
+  }
+
+  /// Cuts a piece down to the share of it that may meet the relief, where that is much less than all.
+  [[nodiscard]] bool cut_to(const Share& share, Piece& piece) const noexcept {
+    constexpr double worth_it = 0.6;
+    if (share.to - share.from > worth_it) return false;
+    Piece less = piece;
+    if (share.from > 0.0) less.from = within(piece, share.from, share.bulge);
+    if (share.to < 1.0) less.to = within(piece, share.to, share.bulge);
+    if (!less.from.reached || !less.to.reached || !(less.from.t < less.to.t)) return false;
+    piece = less;
+    return true;
   }
 
   void evaluate(Moment& moment) const noexcept {
     if (moment.value < infinity || !moment.reached) return;
     count_.evaluations += surface_.heights_at(frame_, moment.place.u, moment.place.v);
-    moment.value = moment.place.height - surface_.height(frame_, moment.place.u, moment.place.v).height;
+    moment.value = moment.place.height - surface_.height_alone(frame_, moment.place.u, moment.place.v);
     // A motion that starts on the surface starts outside it, whatever rounding says.
     if (moment.t == 0.0 && moment.value < 0.0 && moment.value >= -surface_.skin()) moment.value = 0.0;
   }
 
-  /// Whether a piece of the curve is over the face nowhere, or on one side of the relief throughout.
-  [[nodiscard]] bool passed_over(const Piece& piece) const noexcept {
+  /// Whether a piece of the curve is over the face nowhere, or on one side of the relief throughout. Where it is not,
+  /// `share` is the part of it that may be on both.
+  [[nodiscard]] bool passed_over(const Piece& piece, Share& share) const noexcept {
     if (!piece.from.reached || !piece.to.reached) {
       // Where the shell does not reach at either end of ever shorter pieces there is no relief.
       constexpr int patience = 4;
@@ -241,7 +198,7 @@ class PatchRay {
     const ShellPlace& a = piece.from.place;
     const ShellPlace& b = piece.to.place;
     ShellPlace bend;
-    if (!bends_by(piece, bend)) return false;
+    if (!bends_by(piece, bend, share.bulge)) return false;
     const double beside = overlap + std::max(bend.u, bend.v);
     if (std::max(a.u, b.u) < -beside || std::max(a.v, b.v) < -beside ||
         std::min(a.u + a.v, b.u + b.v) > 1.0 + 2.0 * beside)
@@ -260,12 +217,18 @@ class PatchRay {
     const double off = form.error + bend.height + std::abs(form.u) * bend.u + std::abs(form.v) * bend.v +
                        1e-12 * (std::abs(a.height) + std::abs(b.height) + std::abs(form.height));
     if (std::min(over_from, over_to) > off) return true;
-    return std::max(over_from, over_to) < -off - (piece.from.t == 0.0 ? surface_.skin() : 0.0);
+    const double below = off + (piece.from.t == 0.0 ? surface_.skin() : 0.0);
+    if (std::max(over_from, over_to) < -below) return true;
+    share.from = 0.0;
+    share.to = 1.0;
+    static_cast<void>(cut(over_from, over_to - over_from, -below, off, share.from, share.to));
+    return false;
   }
 
-  /// By how much the curve over a piece is off the straight line between its ends, and what it is bent by is known
-  /// well enough. From S(c(t)) = p(t): c'' = -2 h' J^-1 (N' (u', v')).
-  [[nodiscard]] bool bends_by(const Piece& piece, ShellPlace& bend) const noexcept {
+  /// By how much the curve over a piece is off the straight line between its ends at most, and whether what it is bent
+  /// by is known well enough; `bulge` times s (1 - s) is that to first order. From S(c(t)) = p(t): c'' = -2 h' J^-1 (N'
+  /// (u', v')).
+  [[nodiscard]] bool bends_by(const Piece& piece, ShellPlace& bend, ShellPlace& bulge) const noexcept {
     const ShellPrism& prism = frame_.prism;
     const double du = piece.to.place.u - piece.from.place.u;
     const double dv = piece.to.place.v - piece.from.place.v;
@@ -276,8 +239,8 @@ class PatchRay {
       return true;
     }
     const ShellGradients gradients = shell_gradients(prism, piece.from.place);
-    const double second[3] = {std::abs(gradients.u.dot(turn)), std::abs(gradients.v.dot(turn)),
-                              std::abs(gradients.height.dot(turn))};
+    bulge = {0.5 * gradients.u.dot(turn), 0.5 * gradients.v.dot(turn), 0.5 * gradients.height.dot(turn)};
+    const double second[3] = {2.0 * std::abs(bulge.u), 2.0 * std::abs(bulge.v), 2.0 * std::abs(bulge.height)};
     // An eighth of the second derivative, twice over for what it changes by; each by all three, as they turn into one
     // another.
     const double size = std::abs(du) + std::abs(dv);
@@ -295,7 +258,7 @@ class PatchRay {
   }
 
   [[nodiscard]] bool is_leaf(const Piece& piece) const noexcept {
-    if (piece.level >= deepest) return true;
+    if (piece.level >= deepest_part) return true;
     if (!piece.from.reached || !piece.to.reached) return piece.level >= leaf_;
     const double size =
         std::max(std::abs(piece.to.place.u - piece.from.place.u), std::abs(piece.to.place.v - piece.from.place.v));
@@ -397,35 +360,44 @@ class PatchRay {
     return within;
   }
 
-  /// The root between two values of different sign: false position, halving where that is slow. The answer is on the
-  /// first value's side of it.
+  /// The root between two values of different sign: Chandrupatla's method (1997), the parabola through three of them
+  /// where that can be trusted, and halving where not. The answer is on the first value's side of it.
   bool close_in(const Moment& first, const Moment& last, PatchHit& best) const noexcept {
     const double enough = 1e-4 * surface_.skin() / way_.norm();
-    double from = first.t;
-    double to = last.t;
-    ShellPlace answer = first.place;
-    double weight_from = first.value;
-    double weight_to = last.value;
-    for (int i = 0; i < 80 && to - from > enough; ++i) {
-      double t = from + (to - from) * weight_from / (weight_from - weight_to);
-      if (i % 3 == 2 || !(t > from && t < to)) t = 0.5 * (from + to);
-      if (t <= from || t >= to) break;
-      Moment there = at(t, answer);
+    Moment latest = first;
+    Moment other = last;  // of the other sign
+    double share = first.value / (first.value - last.value);
+    for (int i = 0; i < 80 && std::abs(other.t - latest.t) > enough; ++i) {
+      const double least = 0.5 * enough / std::abs(other.t - latest.t);
+      const Moment there = between(latest, other, std::clamp(share, least, 1.0 - least));
       if (!there.reached) return false;
-      evaluate(there);
-      if ((there.value >= 0.0) == (first.value >= 0.0)) {
-        from = t;
-        weight_from = there.value;
-        answer = there.place;
-        weight_to *= 0.5;
-      } else {
-        to = t;
-        weight_to = there.value;
-        weight_from *= 0.5;
+      if (there.t == latest.t || there.t == other.t) break;
+      const bool same = (there.value >= 0.0) == (latest.value >= 0.0);
+      const Moment third = same ? latest : other;
+      if (!same) other = latest;
+      latest = there;
+      const double xi = (latest.t - other.t) / (third.t - other.t);
+      const double phi = (latest.value - other.value) / (third.value - other.value);
+      share = 0.5;
+      if (phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi) {
+        share = latest.value / (other.value - latest.value) * third.value / (other.value - third.value) +
+                (third.t - latest.t) / (other.t - latest.t) * latest.value / (third.value - latest.value) *
+                    other.value / (third.value - other.value);
       }
     }
-    best = {from, answer.u, answer.v};
+    const Moment& answer = (latest.value >= 0.0) == (first.value >= 0.0) ? latest : other;
+    best = {answer.t, answer.place.u, answer.place.v};
     return true;
+  }
+
+  /// The moment so far from one to another, with its height.
+  [[nodiscard]] Moment between(const Moment& from, const Moment& to, double share) const noexcept {
+    const ShellPlace& a = from.place;
+    const ShellPlace& b = to.place;
+    Moment there = at(from.t + share * (to.t - from.t),
+                      {a.u + share * (b.u - a.u), a.v + share * (b.v - a.v), a.height + share * (b.height - a.height)});
+    evaluate(there);
+    return there;
   }
 
   /// Faces overlap by a hair, so that nothing slips in between (barycentric).
@@ -441,159 +413,6 @@ class PatchRay {
   HeightRange range_;  ///< of the heights over all of the face
   mutable WorkCount count_{0, 0, 1};
 };
-
-/// Searches triangles for the point of their relief that is nearest to a point.
-class ReliefNearestSearch {
- public:
-  ReliefNearestSearch(const ReliefSurface& surface, const Vec3& p, double bound, const CoatMoment& moment) noexcept
-      : surface_(surface), p_(p), moment_(moment), distance_(bound) {}
-
-  [[nodiscard]] double distance() const noexcept { return distance_; }
-  [[nodiscard]] bool found() const noexcept { return place_.frame.face != no_index; }
-  [[nodiscard]] const ReliefPlace& place() const noexcept { return place_; }
-  [[nodiscard]] const ReliefPoint& spot() const noexcept { return spot_; }
-  [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
-
-  /// Starts a descent from a place, and keeps where it ends if that is nearer than all before.
-  void descend_from(const ReliefPlace& place) noexcept {
-    ReliefPlace at = place;
-    ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
-    const Goal goal{.point = p_, .may_leave = false, .exactly = true};
-    const DescentEnd end = descend(surface_, at, spot, 1.0, goal, count_);
-    const double now = (spot.point - p_).norm();
-    if (now > distance_ || (now == distance_ && found())) return;
-    distance_ = now;
-    place_ = at;
-    spot_ = spot;
-    rests_ = end == DescentEnd::rest;
-  }
-
-  void visit(std::uint32_t face) noexcept {
-    ReliefPlace here;
-    ++count_.frames;
-    here.frame = found() && place_.frame.face == face ? place_.frame : surface_.frame(face, moment_);
-    const double small = std::ldexp(1.0, -leaf_level(here.frame));
-    Part stack[stack_capacity];
-    int top = 0;
-    if (!window(here.frame, stack[0])) stack[0] = whole();
-    constexpr double tiny = 0.05;
-    if (is_outside(stack[0]) || (is_small(stack[0], tiny * small) && holds_found(face, stack[0]))) return;
-    measure(here.frame, stack[0]);
-    top = stack[0].key < distance_ ? 1 : 0;
-    while (top > 0) {
-      const Part part = stack[--top];
-      if (part.key >= distance_) continue;
-      if (is_small(part, small) || part.level >= deepest) {
-        const Vec2 middle = within_face((part.corner[0] + part.corner[1] + part.corner[2]) / 3.0);
-        here.u = middle.x();
-        here.v = middle.y();
-        ++count_.evaluations;
-        const double now = (surface_.point(here.frame, here.u, here.v).point - p_).norm();
-        // Before anything is found every leaf that may reach into the bound is tried; after that, a leaf this small
-        // whose middle is no nearer lies on the way of a descent that was made already.
-        double slack = 2.0;
-        if (found())
-          slack = holds_found(face, part) ? 0.0 : std::min(0.5, part.radius / std::max(distance_, part.radius));
-        if (now < distance_ + slack * part.radius) descend_from(here);
-        continue;
-      }
-      Part parts[4];
-      split(part, parts);
-      const int below = top;
-      for (Part& child : parts) {
-        if (is_outside(child)) continue;
-        measure(here.frame, child);
-        if (child.key >= distance_) continue;
-        int slot = top++;
-        for (; slot > below && stack[slot - 1].key < child.key; --slot) stack[slot] = stack[slot - 1];
-        stack[slot] = child;
-      }
-    }
-  }
-
- private:
-  /// Around the places of a face that can come within the distance of the point: what is that near to it has shell
-  /// coordinates that near to its own. False where these are not known well enough, or that is most of the face.
-  bool window(const ReliefFrame& frame, Part& part) const noexcept {
-    constexpr double most = 0.2;
-    const ShellPrism& prism = frame.prism;
-    const Vec3 coordinates = PlaneFrame(prism).turned(p_ - prism.corner);
-    ShellPlace place{coordinates.x(), coordinates.y(), coordinates.z()};
-    // Far from the face it is large in any case.
-    if (!(coordinates.cwiseAbs().head<2>().maxCoeff() < 3.0) || !prism.invert(p_, place)) return false;
-    const ShellGradients by = shell_gradients(prism, place);
-    const double u = by.u.norm();
-    const double v = by.v.norm();
-    // By how much the shell's Jacobian may change on the way, as a share of itself: then coordinates change by at most
-    // twice what they do here.
-    const double change = 4.0 * distance_ * by.height.norm() * (u * prism.turn_u.norm() + v * prism.turn_v.norm());
-    const Vec2 reach = 2.0 * distance_ * Vec2(u, v) + Vec2::Constant(1e-12);
-    if (!(change <= 0.25 && reach.maxCoeff() <= most)) return false;
-    const Vec2 lower = Vec2(place.u, place.v) - reach;
-    part = whole();
-    part.corner[0] = lower;
-    part.corner[1] = lower + Vec2(4.0 * reach.x(), 0.0);
-    part.corner[2] = lower + Vec2(0.0, 4.0 * reach.y());
-    return true;
-  }
-
-  static bool is_small(const Part& part, double size) noexcept {
-    return (part.corner[1] - part.corner[0]).cwiseAbs().maxCoeff() <= size &&
-           (part.corner[2] - part.corner[0]).cwiseAbs().maxCoeff() <= size;
-  }
-  static bool is_outside(const Part& part) noexcept {
-    const auto [a, b, c] = part.corner;
-    return std::max({a.x(), b.x(), c.x()}) < 0.0 || std::max({a.y(), b.y(), c.y()}) < 0.0 ||
-           std::min({a.sum(), b.sum(), c.sum()}) > 1.0;
-  }
-  static Vec2 within_face(const Vec2& at) noexcept {
-    Vec2 inside = at.cwiseMax(0.0);
-    if (inside.sum() > 1.0) inside /= inside.sum();
-    return inside;
-  }
-  /// Whether the nearest point so far, a local minimum, lies in the part or beside it by no more than half its size.
-  [[nodiscard]] bool holds_found(std::uint32_t face, const Part& part) const noexcept {
-    if (!rests_ || !found() || place_.frame.face != face) return false;
-    const Vec2 middle = (part.corner[0] + part.corner[1] + part.corner[2]) / 3.0;
-    const Vec2 off = Vec2(place_.u, place_.v) - middle;
-    const Vec2 size = (part.corner[1] - part.corner[0]).cwiseAbs() + (part.corner[2] - part.corner[0]).cwiseAbs();
-    return std::abs(off.x()) <= size.x() && std::abs(off.y()) <= size.y();
-  }
-
-  /// Sets the part's key, which no point of its relief is nearer than.
-  void measure(const ReliefFrame& frame, Part& part) noexcept {
-    const FacePart triangle = FacePart::triangle(part.corner[0], part.corner[1], part.corner[2]);
-    count_.bounds += surface_.bounds_of(frame, triangle);
-    const ReliefBound bound = surface_.bound(frame, triangle);
-    const double square =
-        closest_point_on_triangle(p_, bound.corner[0], bound.corner[1], bound.corner[2]).squared_distance;
-    part.key = std::sqrt(std::max(0.0, square)) - bound.error;
-    const Vec3 middle = (bound.corner[0] + bound.corner[1] + bound.corner[2]) / 3.0;
-    part.radius = 0.0;
-    for (const Vec3& corner : bound.corner) part.radius = std::max(part.radius, (corner - middle).norm());
-    part.radius += bound.error;
-  }
-
-  const ReliefSurface& surface_;
-  Vec3 p_;
-  CoatMoment moment_;
-  double distance_;
-  ReliefPlace place_;
-  ReliefPoint spot_;
-  bool rests_ = false;  ///< at a local minimum
-  WorkCount count_;
-};
-
-Foot foot_at(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& p) noexcept {
-  Foot foot;
-  foot.point = spot.point;
-  foot.distance = (p - spot.point).norm();
-  foot.element = place.frame.face;
-  foot.at = {1.0 - place.u - place.v, place.u, place.v};
-  foot.normal = spot.front;
-  if (foot.normal.dot(p - spot.point) < 0.0) foot.normal = -foot.normal;
-  return foot;
-}
 
 }  // namespace
 
@@ -646,27 +465,6 @@ SweptHit ReliefView::between(const Place& from, const ReliefPoint& start, const 
     return share_vertex(triangles[face], triangles[from.element]) ||
            share_vertex(triangles[face], triangles[to.element]);
   });
-}
-
-Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const noexcept {
-  const MeshSurface& base = surface_->base();
-  ReliefNearestSearch search(*surface_, p, bound, moment_);
-  if (start.element < base.mesh().triangles().size())
-    search.descend_from({frame(start.element), start.at[1], start.at[2]});
-  if (!search.found() && bound == infinity) {
-    const Foot under = base.index().closest(p, infinity, cache_->patch);
-    if (!under.found()) return {};
-    search.descend_from({surface_->frame(under.element, moment_), under.at[1], under.at[2]});
-  }
-  if (search.distance() == infinity) return {};
-  base.index().for_each_near(p, search.distance(), surface_->boxes(), [&](std::uint32_t face) {
-    search.visit(face);
-    return search.distance();
-  });
-  tell(cache_->work, search.count());
-  if (!search.found()) return {};
-  cache_->relief = {search.place(), search.spot(), true};
-  return foot_at(search.place(), search.spot(), p);
 }
 
 }  // namespace asperity
