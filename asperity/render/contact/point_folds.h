@@ -9,7 +9,11 @@ namespace asperity {
 template <SurfaceView View>
 DescentEnd PointProxy<View>::settle_over_folds() noexcept {
   constexpr int most_moves = 24;
+  // Along a crease in ever longer moves: where it rests in one, the first is made in vain in every tick.
+  constexpr double least_grains = 1.0;
   constexpr double most_grains = 16.0;
+  constexpr double growth = 4.0;
+  double grains = least_grains;
   recall_flanks();
   for (int move = 0; move < most_moves && moves_ < most_moves_of_tick && !work_.spent(); ++move, ++moves_) {
     PlaneSet planes;
@@ -26,12 +30,13 @@ DescentEnd PointProxy<View>::settle_over_folds() noexcept {
       return way == Way::free ? end : DescentEnd::rest;
     }
     Vec3 way = along_crease(held) - spot_.point;
-    const double most = most_grains * view_.grain();
+    const double most = grains * view_.grain();
     if (way.norm() > most) way *= most / way.norm();
     if (way.norm() <= view_.skin()) return DescentEnd::rest;
     const Way end = go_along(way);
     if (end == Way::on) continue;
     if (end == Way::stuck) return DescentEnd::rest;
+    grains = std::min(most_grains, growth * grains);
     for (Flank& flank : flanks_) view_.descend(flank.place, flank.spot, beside());
   }
   return DescentEnd::limited;
