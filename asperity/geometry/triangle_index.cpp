@@ -9,8 +9,10 @@ namespace asperity {
 
 namespace {
 
-// Beyond this many mean edges one traversal along the motion is cheaper than filling a patch.
+// Beyond this many mean edges one traversal along the motion is cheaper than filling a patch; beyond so many it is
+// cheaper than a search around its start, where there are more triangles than a patch can hold.
 constexpr double long_motion_in_edges = 12.0;
+constexpr double crowded_motion_in_edges = 0.5;
 constexpr double patch_slack_in_edges = 4.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
@@ -172,11 +174,15 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
     sweep_triangle(face, a, b, c, motion, radius, sides, tolerance_, best);
     return best.t;
   };
-  if (length > long_motion_in_edges * mesh().mean_edge()) {
+  const double touch = radius + touch_in_skins * tolerance_.skin;
+  const auto crowded = [&] {
+    return length > crowded_motion_in_edges * mesh().mean_edge() && std::holds_alternative<Bvh>(inside_->structure) &&
+           !ensure(motion.from, touch + length, patch);
+  };
+  if (length > long_motion_in_edges * mesh().mean_edge() || crowded()) {
     for_each_along(motion, grown, sweep_face);
     return best;
   }
-  const double touch = radius + touch_in_skins * tolerance_.skin;
   if (length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) return best;
   const double margin = error(motion.from);
   const auto resting_on = [&](std::uint32_t face) {
