@@ -374,6 +374,27 @@ TEST(T8_gradients, heights_with_and_without_stitching) {
   }
 }
 
+TEST(HeightsAlone, are_those_with_their_derivatives) {
+  Rng rng(15);
+  int blended = 0;
+  for (const int kind : sound_kinds) {
+    for (const FoldMode folds : {FoldMode::keep, FoldMode::round}) {
+      for (const double high : {amplitude, 60.0 * amplitude}) {
+        const auto surface = patchwork(kind, 5, joined(Blend::quintic, folds, 0.2), Mapping::per_face, high);
+        const double rounding = 1e-14 * surface->coat().amplitude_bound();
+        for (int i = 0; i < 200; ++i) {
+          const ReliefFrame frame = surface->frame(random_face(rng, surface->base().mesh()));
+          const Vec3 at = random_barycentric(rng, 1e-3);
+          blended += surface->heights_at(frame, at[1], at[2]) > 1 ? 1 : 0;
+          ASSERT_NEAR(surface->height_alone(frame, at[1], at[2]), surface->height(frame, at[1], at[2]).height, rounding)
+              << "kind " << kind << " at " << at.transpose();
+        }
+      }
+    }
+  }
+  EXPECT_GT(blended, 2000);
+}
+
 TEST(WalksInBands, come_to_rest_at_newtons_pace) {
   // With the bend of the weights left out each step of such a walk is but a tenth shorter than the one before.
   Rng rng(14);

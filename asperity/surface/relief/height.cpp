@@ -18,7 +18,10 @@ bool ReliefSurface::in_band(const ReliefFrame& frame, double u, double v) const 
 }
 
 double ReliefSurface::height_alone(const ReliefFrame& frame, double u, double v) const noexcept {
-  if (in_band(frame, u, v)) return height(frame, u, v).height;
+  if (in_band(frame, u, v)) {
+    return coat_.settings().stitching.folds == FoldMode::keep ? stitched_height(frame, u, v)
+                                                              : rounded(frame, u, v).height;
+  }
   const double whole = coat_.height(frame.coat, u, v);
   return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
 }
@@ -55,6 +58,24 @@ HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) 
   HeightJet blended = quotient(sum, weights, 1.0 / weights.height);
   lower_by_share(frame, u, v, blended);
   return blended;
+}
+
+double ReliefSurface::stitched_height(const ReliefFrame& frame, double u, double v) const noexcept {
+  const Stitching& stitching = coat_.settings().stitching;
+  const TriangleMesh& mesh = base_.mesh();
+  double weights = weight_alone(stitching, frame.band, u, v);
+  double sum = weights * coat_.height(frame.coat, u, v);
+  const double seam = frame.partly ? frame.seam + u * frame.seam_u + v * frame.seam_v : 1.0;
+  for_each_partner(frame, u, v, [&](std::uint32_t other) {
+    const ProjectedPlace place = project_place(frame.prism, u, v, shell_.prism(mesh, other));
+    if (!place.seen || !has_say(bands_[other], place.u, place.v)) return;
+    const double weight = seam * weight_alone(stitching, bands_[other], place.u, place.v);
+    if (weight <= 0.0) return;
+    weights += weight;
+    sum += weight * coat_.height(coat_.frame(rest_.mesh(), other, frame.coat.moment), place.u, place.v);
+  });
+  const double whole = sum / weights;
+  return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
 }
 
 HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept {

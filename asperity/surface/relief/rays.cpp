@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "asperity/surface/relief/detail/search.h"
 
@@ -75,18 +76,28 @@ bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellP
 /// relief is bounded away from it are passed over, others halved.
 class PatchRay {
  public:
-  PatchRay(const ReliefSurface& surface, const ReliefFrame& frame, const Segment& segment, Sides sides,
-           const HullPart& part) noexcept
+  PatchRay(const ReliefSurface& surface, std::uint32_t face, const ShellPrism& prism, const CoatMoment& moment,
+           const Segment& segment, Sides sides, const HullPart& part) noexcept
       : surface_(surface),
-        frame_(frame),
+        face_(face),
+        prism_(prism),
+        moment_(moment),
         segment_(segment),
         way_(segment.to - segment.from),
         sides_(sides),
-        leaf_(leaf_level(frame)),
         part_(part),
-        range_(surface.range(frame.face)) {}
+        range_(surface.range(face)),
+        per_height_(std::sqrt(prism.edge_u.cross(prism.edge_v).norm())) {}
 
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
+  /// The face's frame: made when it is first asked for, since most faces are passed over without. [servo]
+  [[nodiscard]] const ReliefFrame& frame() const noexcept {
+    if (!frame_) {
+      frame_.emplace(surface_.frame(face_, moment_));
+      leaf_ = leaf_level(*frame_);
+    }
+    return *frame_;
+  }
 
   PatchHit first() noexcept {
     PatchHit best;
@@ -142,18 +153,18 @@ class PatchRay {
 
   Moment at(double t, const ShellPlace& near) const noexcept {
     Moment moment{t, near, infinity, false};
-    moment.reached = frame_.prism.invert(segment_.from + t * way_, moment.place);
+    moment.reached = prism_.invert(segment_.from + t * way_, moment.place);
     return moment;
   }
 
   /// Where the curve over a piece is, `share` of the way along it.
   [[nodiscard]] Moment within(const Piece& piece, double share, const ShellPlace& bulge) const noexcept {
-    const ShellPlace& a = piece.from.place;
-    const ShellPlace& b = piece.to.place;
+    ShellPlace place = along(piece.from, piece.to, share);
     const double off = share * (1.0 - share);
-    return at(piece.from.t + share * (piece.to.t - piece.from.t),
-              {a.u + share * (b.u - a.u) + off * bulge.u, a.v + share * (b.v - a.v) + off * bulge.v,
-               a.height + share * (b.height - a.height) + off * bulge.height});
+    place.u += off * bulge.u;
+    place.v += off * bulge.v;
+    place.height += off * bulge.height;
+    return at(piece.from.t + share * (piece.to.t - piece.from.t), place);
   }
 
   [[nodiscard]] Moment halfway(const Piece& piece, const ShellPlace& bulge) const noexcept {
@@ -181,8 +192,8 @@ class PatchRay {
 
   void evaluate(Moment& moment) const noexcept {
     if (moment.value < infinity || !moment.reached) return;
-    count_.evaluations += surface_.heights_at(frame_, moment.place.u, moment.place.v);
-    moment.value = moment.place.height - surface_.height_alone(frame_, moment.place.u, moment.place.v);
+    count_.evaluations += surface_.heights_at(frame(), moment.place.u, moment.place.v);
+    moment.value = moment.place.height - surface_.height_alone(frame(), moment.place.u, moment.place.v);
     // A motion that starts on the surface starts outside it, whatever rounding says.
     if (moment.t == 0.0 && moment.value < 0.0 && moment.value >= -surface_.skin()) moment.value = 0.0;
   }
@@ -208,8 +219,8 @@ class PatchRay {
     if (std::max(a.height, b.height) + bend.height < range_.lowest - (piece.from.t == 0.0 ? surface_.skin() : 0.0))
       return true;
     const FacePart part = FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v});
-    count_.bounds += surface_.bounds_of(frame_, part);
-    const HeightForm form = surface_.form(frame_, part);
+    count_.bounds += surface_.bounds_of(frame(), part);
+    const HeightForm form = surface_.form(frame(), part);
     // Height over the plane that the relief keeps to, at both ends.
     const double half = 0.5 * (form.u * (b.u - a.u) + form.v * (b.v - a.v));
     const double over_from = a.height - form.height + half;
@@ -229,53 +240,62 @@ class PatchRay {
   /// by is known well enough; `bulge` times s (1 - s) is that to first order. From S(c(t)) = p(t): c'' = -2 h' J^-1 (N'
   /// (u', v')).
   [[nodiscard]] bool bends_by(const Piece& piece, ShellPlace& bend, ShellPlace& bulge) const noexcept {
-    const ShellPrism& prism = frame_.prism;
     const double du = piece.to.place.u - piece.from.place.u;
     const double dv = piece.to.place.v - piece.from.place.v;
     const double dh = piece.to.place.height - piece.from.place.height;
-    const Vec3 turn = (2.0 * dh) * (du * prism.turn_u + dv * prism.turn_v);
+    const Vec3 turn = (2.0 * dh) * (du * prism_.turn_u + dv * prism_.turn_v);
     if (turn.isZero(0.0)) {
       bend = {0.0, 0.0, 0.0};
       return true;
     }
-    const ShellGradients gradients = shell_gradients(prism, piece.from.place);
+    const ShellGradients gradients = shell_gradients(prism_, piece.from.place);
     bulge = {0.5 * gradients.u.dot(turn), 0.5 * gradients.v.dot(turn), 0.5 * gradients.height.dot(turn)};
     const double second[3] = {2.0 * std::abs(bulge.u), 2.0 * std::abs(bulge.v), 2.0 * std::abs(bulge.height)};
     // An eighth of the second derivative, twice over for what it changes by; each by all three, as they turn into one
     // another.
     const double size = std::abs(du) + std::abs(dv);
     const double along = second[0] + second[1];
-    const double per_height = frame_height();
-    const double all = along + second[2] / per_height;
-    if (!(all <= 0.25 * (size + std::abs(dh) / per_height))) return false;
+    const double all = along + second[2] / per_height_;
+    if (!(all <= 0.25 * (size + std::abs(dh) / per_height_))) return false;
     bend = {0.25 * (second[0] + 0.25 * all), 0.25 * (second[1] + 0.25 * all),
-            0.25 * (second[2] + 0.25 * all * per_height)};
+            0.25 * (second[2] + 0.25 * all * per_height_)};
     return true;
-  }
-  /// What a height is measured by, as an edge measures a coordinate (m).
-  [[nodiscard]] double frame_height() const noexcept {
-    return std::sqrt(frame_.prism.edge_u.cross(frame_.prism.edge_v).norm());
   }
 
   [[nodiscard]] bool is_leaf(const Piece& piece) const noexcept {
     if (piece.level >= deepest_part) return true;
+    static_cast<void>(frame());
     if (!piece.from.reached || !piece.to.reached) return piece.level >= leaf_;
-    const double size =
-        std::max(std::abs(piece.to.place.u - piece.from.place.u), std::abs(piece.to.place.v - piece.from.place.v));
-    return size <= std::ldexp(1.0, -leaf_) &&
-           std::abs(piece.to.place.height - piece.from.place.height) <= std::ldexp(frame_height(), -leaf_);
+    return extent(piece) <= std::ldexp(1.0, -leaf_);
+  }
+
+  /// The shorter a piece is the straighter is the relief beside it.
+  [[nodiscard]] int samples_of(const Piece& piece) const noexcept {
+    constexpr int most_samples = 3;
+    constexpr double straight = 1.0 / 16.0;
+    if (!piece.from.reached || !piece.to.reached) return most_samples;
+    const double leaf = std::ldexp(1.0, -leaf_);
+    return extent(piece) <= straight * leaf ? 1 : most_samples;
+  }
+
+  /// By how much the place changes over a piece, as an edge is 1.
+  [[nodiscard]] double extent(const Piece& piece) const noexcept {
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
+    return std::max({std::abs(b.u - a.u), std::abs(b.v - a.v), std::abs(b.height - a.height) / per_height_});
   }
 
   /// Looks for a change of sign of the height over the relief between samples within a leaf, and closes in on it.
-  bool solve(const Piece& piece, PatchHit& best) const noexcept {
-    constexpr int samples = 3;
+  bool solve(const Piece& piece, PatchHit& best) noexcept {
+    const int samples = samples_of(piece);
     const double from = piece.from.t;
     const double to = piece.to.t;
-    Moment before = piece.from;
+    // Mostly it is where the last leaf ended.
+    Moment before = last_end_.t == from ? last_end_ : piece.from;
     evaluate(before);
     for (int i = 1; i <= samples; ++i) {
       const double t = i == samples ? to : from + (to - from) * i / samples;
-      Moment after = i == samples ? piece.to : at(t, before.reached ? before.place : guess(t));
+      Moment after = i == samples ? piece.to : sample(piece, before, t);
       evaluate(after);
       Moment first = before;
       Moment last = after;
@@ -286,7 +306,21 @@ class PatchRay {
       }
       before = after;
     }
+    last_end_ = before;
     return false;
+  }
+
+  [[nodiscard]] Moment sample(const Piece& piece, const Moment& before, double t) const noexcept {
+    if (!before.reached) return at(t, guess(t));
+    if (!piece.to.reached) return at(t, before.place);
+    return at(t, along(before, piece.to, (t - before.t) / (piece.to.t - before.t)));
+  }
+
+  /// The place so far from one moment to another, as if it went straight.
+  static ShellPlace along(const Moment& from, const Moment& to, double share) noexcept {
+    const ShellPlace& a = from.place;
+    const ShellPlace& b = to.place;
+    return {a.u + share * (b.u - a.u), a.v + share * (b.v - a.v), a.height + share * (b.height - a.height)};
   }
 
   /// How far inside a side of the triangle a place is (barycentric).
@@ -392,10 +426,7 @@ class PatchRay {
 
   /// The moment so far from one to another, with its height.
   [[nodiscard]] Moment between(const Moment& from, const Moment& to, double share) const noexcept {
-    const ShellPlace& a = from.place;
-    const ShellPlace& b = to.place;
-    Moment there = at(from.t + share * (to.t - from.t),
-                      {a.u + share * (b.u - a.u), a.v + share * (b.v - a.v), a.height + share * (b.height - a.height)});
+    Moment there = at(from.t + share * (to.t - from.t), along(from, to, share));
     evaluate(there);
     return there;
   }
@@ -404,13 +435,18 @@ class PatchRay {
   static constexpr double overlap = 1e-9;
 
   const ReliefSurface& surface_;
-  const ReliefFrame& frame_;
+  std::uint32_t face_;
+  const ShellPrism& prism_;
+  CoatMoment moment_;
   Segment segment_;
   Vec3 way_;
   Sides sides_;
-  int leaf_;
   HullPart part_;
   HeightRange range_;  ///< of the heights over all of the face
+  Moment last_end_{-1.0, {}, infinity, false};
+  double per_height_;  ///< what a height is measured by, as an edge measures a coordinate (m)
+  mutable std::optional<ReliefFrame> frame_;
+  mutable int leaf_ = 0;  ///< of the frame
   mutable WorkCount count_{0, 0, 1};
 };
 
@@ -427,16 +463,15 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
   surface_->base().index().for_each_along(motion, surface_->boxes(), [&](std::uint32_t face) {
     if (skip(face)) return best.t;
     HullPart part;
-    if (!clip_to_hull(*surface_, face, surface_->shell().prism(surface_->base().mesh(), face), motion, best.t, part))
-      return best.t;
-    const ReliefFrame here = surface_->frame(face, moment_);
-    PatchRay ray(*surface_, here, motion, sides, part);
+    const ShellPrism prism = surface_->shell().prism(surface_->base().mesh(), face);
+    if (!clip_to_hull(*surface_, face, prism, motion, best.t, part)) return best.t;
+    PatchRay ray(*surface_, face, prism, moment_, motion, sides, part);
     const PatchHit hit = ray.first();
     count += ray.count();
     if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
       best.hit = true;
       best.t = hit.t;
-      place = {here, std::clamp(hit.u, 0.0, 1.0), std::clamp(hit.v, 0.0, 1.0)};
+      place = {ray.frame(), std::clamp(hit.u, 0.0, 1.0), std::clamp(hit.v, 0.0, 1.0)};
       if (place.u + place.v > 1.0) place.v = 1.0 - place.u;
     }
     return best.t;

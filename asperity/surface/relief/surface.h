@@ -193,6 +193,7 @@ class ReliefSurface {
   [[nodiscard]] std::vector<Box> enclose(std::span<RoundedSlab> slabs);
   void find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs);
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] double stitched_height(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;

@@ -32,6 +32,14 @@ inline HeightJet place_weight(const Stitching& stitching, const StitchBand& band
           by_00 - 2.0 * by_02 + one[0].weight * one[1].weight * one[2].bend};
 }
 
+/// That weight alone. [servo]
+inline double weight_alone(const Stitching& stitching, const StitchBand& band, double u, double v) noexcept {
+  double weight = 1.0;
+  for (int k = 0; k < 3; ++k)
+    weight *= blend_value(stitching, static_cast<double>(band.rho[k]), coordinate(k, u, v)).weight;
+  return weight;
+}
+
 /// Where a place of one triangle lies on another one's plane, seen along the place's own direction, and how that
 /// changes with the place.
 struct Projection {
