@@ -180,6 +180,42 @@ TEST(TriangleIndex, SweepStopsWhereTheBallFirstTouches) {
   }
 }
 
+// Where more triangles are near than a patch holds: a fine sheet over one whose triangles are far larger, so that a
+// motion of the mean edge is long against the fine ones.
+TEST(TriangleIndex, SweepThroughACrowdOfSmallTrianglesMeetsTheFirst) {
+  MeshSource source = plane_grid(0.02, 0.02, 60, 60);
+  const MeshSource large = plane_grid(0.6, 0.6, 60, 60);
+  const auto before = static_cast<std::uint32_t>(source.positions.size());
+  for (Vec3& p : source.positions) p.z() = 1e-3 * std::sin(900.0 * p.x()) * std::cos(700.0 * p.y());
+  for (const Vec3& p : large.positions) source.positions.push_back(p - Vec3(0.0, 0.0, 0.05));
+  for (const auto& t : large.triangles) source.triangles.push_back({t[0] + before, t[1] + before, t[2] + before});
+  source.corner_uvs.clear();
+  const TriangleIndex index = TriangleIndex::build(TriangleMesh::build(source).value());
+  const double edge = index.mesh().mean_edge();
+  Rng rng(7);
+  TrianglePatch warm;
+  int hits = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 from(rng.uniform(-8e-3, 8e-3), rng.uniform(-8e-3, 8e-3), rng.uniform(-2e-3, 2e-3));
+    const Vec3 way = Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-0.5, 0.5)).normalized();
+    const Segment motion{from, from + edge * std::pow(10.0, rng.uniform(-1.0, 0.5)) * way};
+    const FirstHit expected = index.first_hit(motion);
+    TrianglePatch cold;
+    for (TrianglePatch* patch : {&warm, &cold}) {
+      const SweptHit hit = index.sweep(motion, 0.0, Sides::both, *patch);
+      ASSERT_EQ(hit.hit, expected.face != no_index) << i;
+      if (hit.hit) {
+        // A swept point stops where it touches, a skin before it is through.
+        ASSERT_LE(hit.t, expected.t + 1e-9) << i;
+        const Vec3 x = motion.from + hit.t * (motion.to - motion.from);
+        ASSERT_LE(index.closest(x, infinity).distance, 2.0 * index.skin()) << i;
+      }
+    }
+    hits += expected.face != no_index ? 1 : 0;
+  }
+  EXPECT_GT(hits, 500);
+}
+
 TEST(TriangleIndex, ContactsAreThePlanesWithinTouch) {
   const TriangleIndex index = TriangleIndex::build(TriangleMesh::build(box_mesh(Vec3(0.1, 0.1, 0.1))).value());
   for (const double radius : {0.0, 0.003}) {
