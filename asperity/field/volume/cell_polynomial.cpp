@@ -1,6 +1,7 @@
 #include "asperity/field/volume/cell_polynomial.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -224,62 +225,6 @@ struct FromValues {
 const FromValues<4> from_4_values;
 const FromValues<10> from_10_values;
 
-/// First place in [0, 1] at which a Bernstein polynomial that starts above 0 reaches 0, by halving: where no
-/// coefficient is below 0 there is none. False when there is none.
-template <int Count>
-bool first_zero(const double* coefficients, double tolerance, double& t) noexcept {
-  struct Piece {
-    double c[std::size_t{Count}];
-    double low;
-    double high;
-  };
-  constexpr int most_pieces = 64;
-  constexpr double finest = 1e-15;
-  Piece stack[most_pieces];
-  int top = 1;
-  std::copy(coefficients, coefficients + Count, stack[0].c);
-  stack[0].low = 0.0;
-  stack[0].high = 1.0;
-  while (top > 0) {
-    Piece piece = stack[--top];
-    bool negative = false;
-    int changes = 0;
-    for (int i = 0; i < Count; ++i) {
-      negative = negative || piece.c[i] < 0.0;
-      changes += i > 0 && (piece.c[i] < 0.0) != (piece.c[i - 1] < 0.0) ? 1 : 0;
-    }
-    if (!negative) continue;
-    if (piece.c[0] < 0.0) {
-      t = piece.low;
-      return true;
-    }
-    // One change of sign is one root: close enough is close enough.
-    const double width = piece.high - piece.low;
-    if (width < finest || top + 2 > most_pieces || (changes == 1 && width < tolerance)) {
-      const double from = piece.c[0];
-      const double to = piece.c[Count - 1];
-      // Within the piece the curve is all but straight. Coefficients below 0 in one that is too short to halve are a
-      // touch within rounding.
-      t = changes == 1 ? piece.low + width * from / (from - to)
-                       : (to < 0.0 ? piece.high : 0.5 * (piece.low + piece.high));
-      return true;
-    }
-    Piece right = piece;
-    Piece left = piece;
-    for (int step = 1; step < Count; ++step) {
-      for (int i = 0; i + step < Count; ++i) right.c[i] = 0.5 * (right.c[i] + right.c[i + 1]);
-      left.c[step] = right.c[0];
-    }
-    // de Casteljau leaves the right half's coefficients where they were last written.
-    const double middle = 0.5 * (piece.low + piece.high);
-    left.high = middle;
-    right.low = middle;
-    stack[top++] = right;
-    stack[top++] = left;
-  }
-  return false;
-}
-
 /// The one root of f between t0, where it is above 0, and t1, where it is below: regula falsi after Illinois, halving
 /// where that stands still.
 template <class F>
@@ -309,12 +254,89 @@ double bracketed_root(const F& f, double t0, double f0, double t1, double f1) no
   return low;
 }
 
+/// A Bernstein polynomial at a place in [0, 1], by Horner's scheme.
+template <int Count>
+double bernstein(const double* c, double at) noexcept {
+  constexpr int degree = Count - 1;
+  constexpr auto binomials = [] {
+    std::array<double, std::size_t{Count}> row{};
+    row[0] = 1.0;
+    for (std::size_t i = 1; i < row.size(); ++i)
+      row[i] = row[i - 1] * static_cast<double>(row.size() - i) / static_cast<double>(i);
+    return row;
+  }();
+  const double rest = 1.0 - at;
+  double power = 1.0;
+  double sum = c[0] * rest;
+  for (int i = 1; i < degree; ++i) {
+    power *= at;
+    sum = (sum + power * binomials[static_cast<std::size_t>(i)] * c[i]) * rest;
+  }
+  return sum + power * at * c[degree];
+}
+
+/// First place in [0, 1] at which a Bernstein polynomial that starts above 0 reaches 0, by halving: where no
+/// coefficient is below 0 there is none, where they change their sign once there is one. False when there is none.
+template <int Count>
+bool first_zero(const double* coefficients, double& t) noexcept {
+  struct Piece {
+    double c[std::size_t{Count}];
+    double low;
+    double high;
+  };
+  constexpr int most_pieces = 64;
+  constexpr double finest = 1e-15;
+  Piece stack[most_pieces];
+  int top = 1;
+  std::copy(coefficients, coefficients + Count, stack[0].c);
+  stack[0].low = 0.0;
+  stack[0].high = 1.0;
+  while (top > 0) {
+    Piece piece = stack[--top];
+    bool negative = false;
+    int changes = 0;
+    for (int i = 0; i < Count; ++i) {
+      negative = negative || piece.c[i] < 0.0;
+      changes += i > 0 && (piece.c[i] < 0.0) != (piece.c[i - 1] < 0.0) ? 1 : 0;
+    }
+    if (!negative) continue;
+    if (piece.c[0] < 0.0) {
+      t = piece.low;
+      return true;
+    }
+    const double width = piece.high - piece.low;
+    const double end = piece.c[Count - 1];
+    if (changes == 1 && end < 0.0) {
+      const auto there = [&](double at) { return bernstein<Count>(piece.c, at); };
+      t = piece.low + width * bracketed_root(there, 0.0, piece.c[0], 1.0, end);
+      return true;
+    }
+    if (width < finest || top + 2 > most_pieces) {
+      // Coefficients below 0 in a piece that is too short to halve are a touch within rounding.
+      t = end < 0.0 ? piece.high : 0.5 * (piece.low + piece.high);
+      return true;
+    }
+    Piece right = piece;
+    Piece left = piece;
+    for (int step = 1; step < Count; ++step) {
+      for (int i = 0; i + step < Count; ++i) right.c[i] = 0.5 * (right.c[i] + right.c[i + 1]);
+      left.c[step] = right.c[0];
+    }
+    // de Casteljau leaves the right half's coefficients where they were last written.
+    const double middle = 0.5 * (piece.low + piece.high);
+    left.high = middle;
+    right.low = middle;
+    stack[top++] = right;
+    stack[top++] = left;
+  }
+  return false;
+}
+
 /// The first zero between t0 and t1 of a polynomial with as many coefficients as `from` has rows, as a fraction.
 template <class F, int Count>
 bool first_zero_of(const F& f, const FromValues<Count>& from, double t0, double f0, double t1, double f1,
                    double& found) noexcept {
   constexpr auto size = static_cast<std::size_t>(Count);
-  constexpr double close = 1e-7;
   double values[size];
   double c[size];
   values[0] = f0;
@@ -326,7 +348,7 @@ bool first_zero_of(const F& f, const FromValues<Count>& from, double t0, double 
   }
   c[0] = f0;
   c[size - 1] = f1;
-  return first_zero<Count>(c, close, found);
+  return first_zero<Count>(c, found);
 }
 
 }  // namespace
