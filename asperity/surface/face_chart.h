@@ -13,6 +13,8 @@ namespace asperity {
 
 // A barycentric coordinate this small is 0: moving along an edge leaves rounding in it.
 inline constexpr double on_border = 1e-13;
+/// Faces reach so far beyond a rim (barycentric): a step that leads no farther out is one along it.
+inline constexpr double rim_hair = 1e-9;
 
 /// By how much a step changes the coordinate of corner k. [servo]
 inline double change(const WalkStep& step, int k) noexcept {
@@ -168,7 +170,9 @@ class FaceChart {
     Place across = place_;
     const double rest = rest_length(moves == 0);
     // Beyond the rim there is nothing that could hold the point.
-    if (!cross_edge(across, k)) return may_leave ? Turn::rim : along_edge(step, goal, k, rest);
+    if (!cross_edge(across, k)) {
+      return may_leave && change(step, k) < -rim_hair ? Turn::rim : along_edge(step, goal, k, rest);
+    }
     ++moves;
     ++frames_;
     const Spot there = faces_.evaluate(across.frame, across.u, across.v);

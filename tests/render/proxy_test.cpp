@@ -139,6 +139,38 @@ TEST(ProxyInvariants, in_a_valley_sharper_than_a_right_angle_it_rests_on_the_fla
     EXPECT_EQ(wrong_without_friction(seed), "") << "seed " << seed;
 }
 
+TEST(ProxyInvariants, led_along_the_rim_of_an_open_sheet_it_stays_on_the_rim) {
+  // As on the bare mesh. Rounding alone says now that the next step leads off the sheet, now that it does not.
+  for (MeshSource source : {trial_mesh_f(10, 0.02), cone(40, 0.02, 0.008)}) {
+    const auto surface = relief_on(mesh_of(std::move(source)), {tiled(flat_map(0.0))},
+                                   CoatSettings{Mapping::per_face, Vec2::Ones(), {}});
+    const Scene scene = must(Scene::build({instance_of(surface)}, 0.0));
+    const TriangleMesh& mesh = surface->base().mesh();
+    int rims = 0;
+    for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+      for (int edge = 0; edge < 3; ++edge) {
+        if (mesh.neighbour(face, edge) != no_index) continue;
+        const auto corners = mesh.corners(face);
+        const Vec3& from = corners[static_cast<std::size_t>(edge)];
+        const Vec3 way = corners[static_cast<std::size_t>((edge + 1) % 3)] - from;
+        const Vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        const Vec3 normal = mesh.face_normal(face);
+        ProxyState state;
+        touch(scene, state, middle + 1e-3 * normal);
+        touch(scene, state, middle - 1e-4 * normal);
+        for (int i = 0; i <= 100; ++i) {
+          const Vec3 on_rim = from + (0.1 + 0.008 * i) * way;
+          const ForceSample felt = touch(scene, state, on_rim - 1e-4 * normal);
+          ASSERT_TRUE(felt.flags.has(TickFlag::contact)) << "face " << face << ", step " << i;
+          ASSERT_LE((felt.proxy - on_rim).norm(), 10.0 * surface->skin()) << "face " << face << ", step " << i;
+        }
+        ++rims;
+      }
+    }
+    EXPECT_GT(rims, 10);
+  }
+}
+
 RC_GTEST_PROP(ProxyInvariants, with_friction_the_force_lies_within_coulombs_cone_and_sticks_below_it,
               (std::uint64_t seed)) {
   // On smooth reliefs: at an edge or in a corner the normal is one of many.
