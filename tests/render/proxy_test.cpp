@@ -133,8 +133,9 @@ RC_GTEST_PROP(ProxyInvariants, without_friction_the_force_is_the_spring_along_th
   RC_ASSERT(wrong_without_friction(seed) == "");
 }
 
-TEST(ProxyInvariants, in_a_valley_sharper_than_a_right_angle_it_rests_on_the_flank_that_it_is_behind) {
-  // Ways that end between two such flanks, before the one and behind the other.
+TEST(ProxyInvariants, past_a_ridge_sharper_than_a_right_angle_it_is_not_drawn_back) {
+  // Ways over such ridges: a motion that starts less than a skin behind the plane of the face that it came along, and
+  // comes up beside it, has not gone into it.
   for (const std::uint64_t seed : {32U, 61U, 729U, 1526U, 2208U, 3442U, 3827U, 4371U})
     EXPECT_EQ(wrong_without_friction(seed), "") << "seed " << seed;
 }

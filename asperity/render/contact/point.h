@@ -46,7 +46,6 @@ class PointProxy {
         rest.pulls = true;
         return rest;
       }
-      if (end == DescentEnd::left && lies_between()) return resting(true);
       Vec3 start;
       // Where there is no place to fly from it stays.
       if (!view_.launch(place_, spot_, start)) return resting(true);
@@ -81,8 +80,6 @@ class PointProxy {
     const SweptHit hit = view_.first_touch({from, probe_}, sides_);
     if (!hit.hit || hit.contact.normal.isZero()) return false;
     take(hit);
-    landed_ = place_;
-    landed_spot_ = spot_;
     state_.rests = true;
     return true;
   }
@@ -98,19 +95,6 @@ class PointProxy {
       left_at_ = distance;
     }
     return in_vain_ == most_in_vain;
-  }
-
-  /// Whether it lies in a valley sharper than a right angle, before one flank and behind the other: what leaves the one
-  /// lands on the other where it left, and is led back. It rests on the flank that it is behind.
-  [[nodiscard]] bool lies_between() noexcept {
-    const double near = 4.0 * view_.skin();
-    const double distance = (spot_.point - probe_).norm();
-    const bool between = distance >= left_from_ - near && (landed_spot_.point - spot_.point).norm() <= near;
-    left_from_ = distance;
-    if (!between) return false;
-    place_ = landed_;
-    spot_ = landed_spot_;
-    return true;
   }
 
   /// Whether another fold lies between where it is and where it would fly from.
@@ -231,9 +215,6 @@ class PointProxy {
   int moves_ = 0;              ///< between overlapping folds
   int in_vain_ = 0;            ///< flights that came hardly nearer
   double left_at_ = infinity;  ///< distance from the probe where it flew off last
-  double left_from_ = infinity;
-  Place landed_;  ///< where the last flight ended
-  Spot landed_spot_;
 };
 
 }  // namespace asperity

@@ -73,7 +73,7 @@ bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellP
 
 /// Searches one triangle for the first place where a segment meets its relief. A crossing lies on the curve that the
 /// segment is in the shell's coordinates, so that the search is along that curve alone: pieces of it over which the
-/// relief is bounded away from it are passed over, others halved.
+/// relief is bounded away from it are passed over, others cut to what may meet it, or halved.
 class PatchRay {
  public:
   PatchRay(const ReliefSurface& surface, std::uint32_t face, const ShellPrism& prism, const CoatMoment& moment,
@@ -92,10 +92,7 @@ class PatchRay {
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
   /// The face's frame: made when it is first asked for, since most faces are passed over without. [servo]
   [[nodiscard]] const ReliefFrame& frame() const noexcept {
-    if (!frame_) {
-      frame_.emplace(surface_.frame(face_, moment_));
-      leaf_ = leaf_level(*frame_);
-    }
+    if (!frame_) frame_.emplace(surface_.frame(face_, moment_));
     return *frame_;
   }
 
@@ -194,8 +191,6 @@ class PatchRay {
     if (moment.value < infinity || !moment.reached) return;
     count_.evaluations += surface_.heights_at(frame(), moment.place.u, moment.place.v);
     moment.value = moment.place.height - surface_.height_alone(frame(), moment.place.u, moment.place.v);
-    // A motion that starts on the surface starts outside it, whatever rounding says.
-    if (moment.t == 0.0 && moment.value < 0.0 && moment.value >= -surface_.skin()) moment.value = 0.0;
   }
 
   /// Whether a piece of the curve is over the face nowhere, or on one side of the relief throughout. Where it is not,
@@ -262,11 +257,16 @@ class PatchRay {
     return true;
   }
 
+  /// How often a whole face is halved to a leaf.
+  [[nodiscard]] int leaf() const noexcept {
+    if (leaf_ < 0) leaf_ = leaf_level(frame());
+    return leaf_;
+  }
+
   [[nodiscard]] bool is_leaf(const Piece& piece) const noexcept {
     if (piece.level >= deepest_part) return true;
-    static_cast<void>(frame());
-    if (!piece.from.reached || !piece.to.reached) return piece.level >= leaf_;
-    return extent(piece) <= std::ldexp(1.0, -leaf_);
+    if (!piece.from.reached || !piece.to.reached) return piece.level >= leaf();
+    return extent(piece) <= std::ldexp(1.0, -leaf());
   }
 
   /// The shorter a piece is the straighter is the relief beside it.
@@ -274,8 +274,7 @@ class PatchRay {
     constexpr int most_samples = 3;
     constexpr double straight = 1.0 / 16.0;
     if (!piece.from.reached || !piece.to.reached) return most_samples;
-    const double leaf = std::ldexp(1.0, -leaf_);
-    return extent(piece) <= straight * leaf ? 1 : most_samples;
+    return extent(piece) <= straight * std::ldexp(1.0, -leaf()) ? 1 : most_samples;
   }
 
   /// By how much the place changes over a piece, as an edge is 1.
@@ -300,6 +299,12 @@ class PatchRay {
       Moment first = before;
       Moment last = after;
       if (keep_over_face(first, last)) {
+        // A motion that starts on the surface starts outside it, whatever rounding says; and as long as it only comes
+        // up from there it has not gone in.
+        if (first.t == 0.0 && first.value < 0.0 && first.value >= -surface_.skin()) {
+          if (last.value < 0.0 && last.value >= first.value) continue;
+          first.value = 0.0;
+        }
         const bool enters = first.value >= 0.0 && last.value < 0.0;
         const bool leaves = first.value < 0.0 && last.value >= 0.0;
         if ((enters || (leaves && sides_ == Sides::both)) && close_in(first, last, best)) return true;
@@ -446,7 +451,7 @@ class PatchRay {
   Moment last_end_{-1.0, {}, infinity, false};
   double per_height_;  ///< what a height is measured by, as an edge measures a coordinate (m)
   mutable std::optional<ReliefFrame> frame_;
-  mutable int leaf_ = 0;  ///< of the frame
+  mutable int leaf_ = -1;  ///< not known yet
   mutable WorkCount count_{0, 0, 1};
 };
 
