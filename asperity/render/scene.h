@@ -33,7 +33,7 @@ struct SceneSettings {
   /// that is not at rest by then goes on from where it is in the next tick (work_left). Without a value budget_for.
   std::optional<std::uint32_t> budget = {};
   static constexpr std::uint32_t least_budget = 100;
-  /// For a point about 60 us; a ball's single searches take more than any such budget: none. [any]
+  /// For a point 40 to 60 us; a ball's single searches take more than any such budget: none. [any]
   static constexpr std::uint32_t budget_for(double probe_radius) noexcept { return probe_radius > 0.0 ? 0 : 600; }
 };
 
