@@ -10,6 +10,7 @@
 #include "asperity/core/formulation.h"
 #include "asperity/core/frames.h"
 #include "asperity/core/identity.h"
+#include "asperity/core/lanes.h"
 #include "asperity/core/math.h"
 #include "asperity/core/named_numbers.h"
 #include "asperity/core/names.h"

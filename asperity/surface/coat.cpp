@@ -379,6 +379,60 @@ double Coat::own_height(const CoatFrame& frame, double u, double v) const noexce
   return sum / std::max(weight, std::numeric_limits<double>::min());
 }
 
+void Coat::heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept {
+  if (!frame.layers.empty()) {
+    for (std::size_t i = 0; i < lanes; ++i) heights[i] = layered_jet(frame, u[i], v[i]).height;
+    return;
+  }
+  if (frame.triplanar) return triplanar_heights(frame, u, v, heights);
+  Lanes s;
+  Lanes t;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    s[i] = frame.st.x() + u[i] * frame.st_u.x() + v[i] * frame.st_v.x();
+    t[i] = frame.st.y() + u[i] * frame.st_u.y() + v[i] * frame.st_v.y();
+  }
+  frame.maps->heights(s, t, frame.level, heights);
+}
+
+void Coat::triplanar_heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) noexcept {
+  const Vec2& tile = frame.maps->tile();
+  Lanes along_s[3];  // places as texture coordinates along s, and along t
+  Lanes along_t[3];
+  Lanes normal[3];
+  Lanes least;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < lanes; ++i) {
+      const double place = frame.point[axis] + u[i] * frame.point_u[axis] + v[i] * frame.point_v[axis];
+      along_s[axis][i] = place / tile.x();
+      along_t[axis][i] = place / tile.y();
+      normal[axis][i] = frame.normal[axis] + u[i] * frame.normal_u[axis] + v[i] * frame.normal_v[axis];
+    }
+  }
+  for (std::size_t i = 0; i < lanes; ++i) {
+    least[i] =
+        triplanar_threshold * (normal[0][i] * normal[0][i] + normal[1][i] * normal[1][i] + normal[2][i] * normal[2][i]);
+  }
+  Lanes sum{};
+  Lanes weight{};
+  for (int axis = 0; axis < 3; ++axis) {
+    Lanes square;
+    double any = 0.0;
+    for (std::size_t i = 0; i < lanes; ++i) {
+      const double q = std::max(0.0, normal[axis][i] * normal[axis][i] - least[i]);
+      square[i] = q * q;
+      any = std::max(any, q);
+    }
+    if (any <= 0.0) continue;
+    Lanes height;
+    frame.maps->heights(along_s[(axis + 1) % 3], along_t[(axis + 2) % 3], frame.level, height);
+    for (std::size_t i = 0; i < lanes; ++i) {
+      sum[i] += square[i] * height[i];
+      weight[i] += square[i];
+    }
+  }
+  for (std::size_t i = 0; i < lanes; ++i) heights[i] = sum[i] / std::max(weight[i], std::numeric_limits<double>::min());
+}
+
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
   if (frame.triplanar) return triplanar_jet(frame, u, v);
   const HeightCurvature map = frame.maps->curvature(frame.st + u * frame.st_u + v * frame.st_v, frame.level);

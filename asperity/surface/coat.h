@@ -121,6 +121,8 @@ class Coat {
   [[nodiscard]] double height(const CoatFrame& frame, double u, double v) const noexcept {
     return frame.layers.empty() ? own_height(frame, u, v) : layered_jet(frame, u, v).height;
   }
+  /// The same at several places at once, equal to the bit. [servo]
+  void heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept;
   /// Bounds of the face's own height over the triangle with these three corners (barycentric u, v). [servo]
   [[nodiscard]] HeightRange range(const CoatFrame& frame, const Vec2 corners[3]) const noexcept;
   /// A plane that the face's own height keeps to over part of it: where the relief is smooth the error is of second
@@ -171,6 +173,7 @@ class Coat {
                                             const Vec3& barycentric) const noexcept;
 
   [[nodiscard]] double own_height(const CoatFrame& frame, double u, double v) const noexcept;
+  static void triplanar_heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) noexcept;
   [[nodiscard]] HeightJet own_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet layered_jet(const CoatFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet triplanar_jet(const CoatFrame& frame, double u, double v) const noexcept;

@@ -98,11 +98,16 @@ class FaceChart {
     new (&spot) Spot(faces_.evaluate(place_.frame, to.x(), to.y()));
     return faces_.free(place_.frame, spot_, spot);
   }
-  [[nodiscard]] double squared_distance(const Vec2& to, const Vec3& goal) const noexcept requires
+  /// Of several places at once. What is made use of is counted by `look`.
+  void squared_distances(const Lanes& u, const Lanes& v, const Vec3& goal, Lanes& squares) const noexcept requires
       requires(const Faces& faces, const Place& place) {
-    faces.squared_distance(place.frame, place.u, place.v, goal);
+    faces.squared_distances(place.frame, u, v, goal, squares);
   }
-  { return faces_.squared_distance(place_.frame, to.x(), to.y(), goal); }
+  { faces_.squared_distances(place_.frame, u, v, goal, squares); }
+  void look(double u, double v) const noexcept requires requires(const Faces& faces, const Place& place) {
+    faces.look(place.frame, u, v);
+  }
+  { faces_.look(place_.frame, u, v); }
   /// Something is in the way that no shorter step avoids.
   [[nodiscard]] bool stopped() const noexcept requires requires(const Faces& faces) { faces.blocked; }
   { return faces_.blocked; }

@@ -188,8 +188,6 @@ void relax(const TriangleMesh& mesh, const std::vector<std::vector<WeightedNorma
 
 bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
   constexpr int most_steps = 16;
-  // The next step would be as small against this one as this one is: below rounding.
-  constexpr double enough = 1e-8;
   for (int i = 0; i < most_steps; ++i) {
     const Vec3 du = edge_u + place.height * turn_u;
     const Vec3 dv = edge_v + place.height * turn_v;
@@ -213,8 +211,8 @@ bool ShellPrism::invert(const Vec3& p, ShellPlace& place) const noexcept {
     const auto within = [&](double size) {
       return plane <= size && square * square <= area * (size * size) * (size * size);
     };
-    if (within(enough)) return determinant(place) > 0.0;
-    if (!within(1e6)) return false;
+    if (within(enough_of_step)) return determinant(place) > 0.0;
+    if (!within(far_of_step)) return false;
   }
   return false;
 }

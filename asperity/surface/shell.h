@@ -1,9 +1,11 @@
 #pragma once
 // Shell coordinates: the space around a triangle mesh as (place on a triangle, height along interpolated directions).
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "asperity/core/lanes.h"
 #include "asperity/core/math.h"
 #include "asperity/core/names.h"
 #include "asperity/geometry/mesh.h"
@@ -25,6 +27,14 @@ struct ShellInterval {
   double upper = 0.0;
 };
 
+/// Several places of a shell side by side.
+struct ShellPlaces {
+  Lanes u;
+  Lanes v;
+  Lanes height;
+  std::array<bool, lanes> reached;  ///< by the shell
+};
+
 /// One prism of the shell (formulation D2): S(u, v, h) = V(u, v) + h N(u, v), both linear in u and v. Not normalised,
 /// so S is a polynomial; neighbours share the directions of their corners, so it is continuous across edges.
 struct ShellPrism {
@@ -34,6 +44,11 @@ struct ShellPrism {
   Vec3 direction;  ///< of the first corner; its component along the triangle's normal is about 1
   Vec3 turn_u;     ///< direction of the second corner - that of the first
   Vec3 turn_v;
+
+  // What a step of `invert` is measured by, an edge as 1: the next would be as small against one of this size as that
+  // is, far below what faces overlap by; and what is so far off goes nowhere.
+  static constexpr double enough_of_step = 3e-7;
+  static constexpr double far_of_step = 1e6;
 
   [[nodiscard]] Vec3 base_at(double u, double v) const noexcept { return corner + u * edge_u + v * edge_v; }
   [[nodiscard]] Vec3 direction_at(double u, double v) const noexcept { return direction + u * turn_u + v * turn_v; }
@@ -48,6 +63,9 @@ struct ShellPrism {
   /// Inverts S by Newton's method from `place` (a guess; the answer is put there). False when it does not converge to a
   /// place where the shell is regular; `place` is then meaningless. [servo]
   [[nodiscard]] bool invert(const Vec3& p, ShellPlace& place) const noexcept;
+  /// The same of several points, given by their coordinates x, y and z (m), by AVX2 where the processor has it, which
+  /// changes no bit. [servo]
+  void invert(const std::array<Lanes, 3>& points, ShellPlaces& places) const noexcept;
   /// The same without a guess: all heights at which p lies in the plane of the triangle moved along the directions are
   /// roots of a cubic; the regular one nearest to the triangle is taken. [servo]
   [[nodiscard]] bool invert_anew(const Vec3& p, ShellPlace& place) const noexcept;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/core/lanes.h"
 #include "asperity/surface/view.h"
 #include "asperity/surface/walk_step.h"
 
@@ -165,13 +166,26 @@ class Walk {
   template <class Start>
   int look_ahead(const Start& start, const WalkStep& step, double far, int count, double& distance) noexcept {
     int seen = 0;
-    for (; seen + 1 < count && !out_of_moves(); ++seen) {
-      ++moves_;
-      const double now = chart_.squared_distance(chart_.moved(start, step, far * (seen + 1) / count, -1), goal_);
-      if (!(now < distance)) break;
-      distance = now;
+    while (true) {
+      Lanes u;
+      Lanes v;
+      for (std::size_t i = 0; i < lanes; ++i) {
+        const int sample = std::min(seen + 1 + static_cast<int>(i), count - 1);
+        const Vec2 to = chart_.moved(start, step, far * sample / count, -1);
+        u[i] = to.x();
+        v[i] = to.y();
+      }
+      Lanes now;
+      chart_.squared_distances(u, v, goal_, now);
+      for (std::size_t i = 0; i < lanes; ++i) {
+        if (seen + 1 >= count || out_of_moves()) return seen;
+        ++moves_;
+        chart_.look(u[i], v[i]);
+        if (!(now[i] < distance)) return seen;
+        distance = now[i];
+        ++seen;
+      }
     }
-    return seen;
   }
 
   /// The same to the end of the step where the distance falls all along, or to the last sample before it. False where
@@ -190,8 +204,8 @@ class Walk {
     return true;
   }
 
-  static constexpr bool looks_ahead = requires(const Chart& chart, const Vec2& to, const Vec3& goal) {
-    chart.squared_distance(to, goal);
+  static constexpr bool looks_ahead = requires(const Chart& chart, const Lanes& at, const Vec3& goal, Lanes& squares) {
+    chart.squared_distances(at, at, goal, squares);
   };
   static constexpr int most_aims = 2;
   // A walk is at rest where so many moves bring it nearer by less than this share of the distance.

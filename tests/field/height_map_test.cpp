@@ -330,6 +330,45 @@ TEST(HeightMapGradient, IsZeroForNearest) {
   EXPECT_EQ(map.sample({0.3, 0.7}).gradient, Vec2::Zero());
 }
 
+/// Coordinates in and around the map, and those that a division by zero leaves behind.
+double any_coordinate(Rng& rng) {
+  const double special[] = {0.0,
+                            1.0,
+                            -1e-18,
+                            -0.25,
+                            1e-300,
+                            0x1p31,
+                            -0x1p40,
+                            1e300,
+                            infinity,
+                            -infinity,
+                            std::numeric_limits<double>::quiet_NaN()};
+  return rng.below(4) == 0 ? special[rng.below(std::size(special))] : rng.uniform(-3.0, 3.0);
+}
+
+RC_GTEST_PROP(HeightMapLanes, SeveralAtOnceAreEachAsAloneToTheBit, ()) {
+  const int width = *rc::gen::inRange(1, 20);
+  const int height = *rc::gen::inRange(1, 20);
+  const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
+  const Reconstruction reconstruction =
+      *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  for (int i = 0; i < 50; ++i) {
+    // Mostly all within reach of a register, sometimes one that is not.
+    const bool strange = rng.below(3) == 0;
+    Lanes s;
+    Lanes t;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      s[lane] = strange ? any_coordinate(rng) : rng.uniform(-3.0, 3.0);
+      t[lane] = strange ? any_coordinate(rng) : rng.below(4) / 4.0;
+    }
+    Lanes heights;
+    map.heights_at(s, t, heights);
+    for (std::size_t lane = 0; lane < lanes; ++lane) RC_ASSERT(heights[lane] == map.height_at(Vec2(s[lane], t[lane])));
+  }
+}
+
 RC_GTEST_PROP(HeightMapCurvature, HasTheHeightAndGradientOfSampleToTheBit, ()) {
   const int width = *rc::gen::inRange(1, 20);
   const int height = *rc::gen::inRange(1, 20);
@@ -338,22 +377,8 @@ RC_GTEST_PROP(HeightMapCurvature, HasTheHeightAndGradientOfSampleToTheBit, ()) {
       *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
   const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
-  const auto coordinate = [&] {
-    const double special[] = {0.0,
-                              1.0,
-                              -1e-18,
-                              -0.25,
-                              1e-300,
-                              0x1p31,
-                              -0x1p40,
-                              1e300,
-                              infinity,
-                              -infinity,
-                              std::numeric_limits<double>::quiet_NaN()};
-    return rng.below(4) == 0 ? special[rng.below(std::size(special))] : rng.uniform(-3.0, 3.0);
-  };
   for (int i = 0; i < 50; ++i) {
-    const Vec2 st(coordinate(), coordinate());
+    const Vec2 st(any_coordinate(rng), any_coordinate(rng));
     const HeightSample sample = map.sample(st);
     const HeightCurvature curvature = map.curvature(st);
     RC_ASSERT(curvature.height == sample.height);

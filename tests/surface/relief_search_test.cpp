@@ -143,6 +143,38 @@ TEST(ReliefSearch, a_segment_that_clearly_crosses_a_closed_relief_is_never_misse
   }
 }
 
+TEST(ReliefSearch, a_motion_from_just_below_the_surface_is_stopped_where_it_goes_in) {
+  // As rounding leaves a proxy: less than a skin inside. Whether it first comes up by less than that or not, a motion
+  // that ends well inside has gone in.
+  Rng rng(76);
+  for (const Searched& one : reliefs()) {
+    const ReliefSurface& surface = *one.surface;
+    const double skin = surface.skin();
+    SurfaceCache cache;
+    int inside = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const ReliefFrame frame = surface.frame(random_face(rng, surface.base().mesh()));
+      const Vec3 at = random_barycentric(rng, 0.05);
+      const ReliefPoint spot = surface.point(frame, at[1], at[2]);
+      const Vec3 tangent = spot.front.cross(random_direction(rng)).normalized();
+      const double length = surface.grain() * std::pow(10.0, rng.uniform(-3.5, 0.0));
+      // Up by less than a skin on the first hundredth of the way, and well inside at its end as the relief bends up.
+      const Vec3 from = spot.point - skin * rng.uniform(0.05, 0.95) * spot.front;
+      const Vec3 to = from + length * tangent + rng.uniform(-2.0, 60.0) * skin * spot.front;
+      ShellPlace start;
+      ShellPlace end;
+      if (!frame.prism.invert_anew(from, start) || !frame.prism.invert_anew(to, end)) continue;
+      if (start.barycentric().minCoeff() < 0.01 || end.barycentric().minCoeff() < 0.01) continue;
+      // A skin is measured along the shell's directions.
+      if (start.height - surface.height(frame, start.u, start.v).height < -0.99 * skin) continue;
+      if (end.height - surface.height(frame, end.u, end.v).height > -3.0 * skin) continue;
+      ++inside;
+      ASSERT_TRUE(surface.view(cache).first_touch({from, to}, Sides::front).hit) << one.name << ", motion " << i;
+    }
+    EXPECT_GT(inside, 50) << one.name;
+  }
+}
+
 TEST(ReliefSearch, caches_change_no_answer) {
   Rng rng(73);
   for (const Searched& one : reliefs()) {

@@ -67,6 +67,43 @@ RC_GTEST_PROP(T6_injectivity, round_trip_from_a_guess_is_exact_within_the_inject
   }
 }
 
+RC_GTEST_PROP(T6_injectivity, several_at_once_are_inverted_as_each_alone, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const TriangleMesh mesh = any_mesh(rng, seed);
+  const Shell shell = Shell::build(mesh);
+  const double edge = mesh.mean_edge();
+  for (int i = 0; i < 100; ++i) {
+    const std::uint32_t face = random_face(rng, mesh);
+    const ShellPrism prism = shell.prism(mesh, face);
+    const ShellInterval room = prism.injective(0.0, edge);
+    if (!(room.upper > room.lower)) continue;
+    std::array<Lanes, 3> points;
+    ShellPlaces found;
+    ShellPlace alone[lanes];
+    bool reached[lanes];
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const ShellPlace place = random_place(rng, room);
+      // One of them so far off that it may be reached from nowhere.
+      const Vec3 p = prism.point(place) + (rng.below(5) == 0 ? random_vector(rng, 10.0 * edge) : Vec3(Vec3::Zero()));
+      for (std::size_t axis = 0; axis < 3; ++axis) points[axis][lane] = p[static_cast<int>(axis)];
+      alone[lane] = {place.u + rng.uniform(-0.01, 0.01), place.v + rng.uniform(-0.01, 0.01),
+                     place.height + 0.01 * rng.uniform(room.lower, room.upper)};
+      found.u[lane] = alone[lane].u;
+      found.v[lane] = alone[lane].v;
+      found.height[lane] = alone[lane].height;
+      reached[lane] = prism.invert(p, alone[lane]);
+    }
+    prism.invert(points, found);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const ShellPlace place{found.u[lane], found.v[lane], found.height[lane]};
+      // A place that one form only just reaches, and the other one not, is far from every relief.
+      const bool far = std::abs(place.height) > edge;
+      RC_ASSERT(found.reached[lane] == reached[lane] || far);
+      if (found.reached[lane] && reached[lane]) RC_ASSERT(difference(prism, place, alone[lane], edge) < 1e-9 || far);
+    }
+  }
+}
+
 RC_GTEST_PROP(T6_injectivity, round_trip_without_a_guess_is_exact_within_the_injective_interval, (std::uint64_t seed)) {
   Rng rng(seed);
   const TriangleMesh mesh = any_mesh(rng, seed);

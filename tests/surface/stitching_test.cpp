@@ -395,6 +395,40 @@ TEST(HeightsAlone, are_those_with_their_derivatives) {
   EXPECT_GT(blended, 2000);
 }
 
+TEST(HeightsAlone, several_at_once_are_each_as_alone) {
+  Rng rng(16);
+  int blended = 0;
+  for (const int kind : sound_kinds) {
+    for (const Mapping mapping : {Mapping::per_face, Mapping::triplanar}) {
+      for (const double high : {amplitude, 60.0 * amplitude}) {
+        const auto surface = patchwork(kind, 5, joined(Blend::quintic, FoldMode::keep, 0.2), mapping, high);
+        for (int i = 0; i < 100; ++i) {
+          const ReliefFrame frame = surface->frame(random_face(rng, surface->base().mesh()));
+          Lanes u;
+          Lanes v;
+          for (std::size_t lane = 0; lane < lanes; ++lane) {
+            const Vec3 at = random_barycentric(rng, 1e-3);
+            u[lane] = at[1];
+            v[lane] = at[2];
+          }
+          Lanes heights;
+          surface->heights_alone(frame, u, v, heights);
+          const Vec3 from = random_vector(rng, 0.02);
+          Lanes squares;
+          surface->squared_distances(frame, u, v, from, squares);
+          for (std::size_t lane = 0; lane < lanes; ++lane) {
+            blended += surface->heights_at(frame, u[lane], v[lane]) > 1 ? 1 : 0;
+            ASSERT_EQ(heights[lane], surface->height_alone(frame, u[lane], v[lane])) << "kind " << kind;
+            const double expected = (surface->place(frame, u[lane], v[lane]) - from).squaredNorm();
+            ASSERT_NEAR(squares[lane], expected, 1e-14 * expected) << "kind " << kind;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(blended, 500);
+}
+
 TEST(WalksInBands, come_to_rest_at_newtons_pace) {
   // With the bend of the weights left out each step of such a walk is but a tenth shorter than the one before.
   Rng rng(14);

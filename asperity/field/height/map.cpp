@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "asperity/field/height/detail/spline_lanes.h"
 #include "asperity/field/height/detail/spline_prefilter.h"
 #include "asperity/field/height/detail/texel_coordinate.h"
 
@@ -252,7 +253,7 @@ void HeightMap::store(const std::vector<float>& source, double offset, double sc
   }
   const auto apron = static_cast<std::size_t>(stored().apron());
   const std::size_t stride = stored().stride();
-  values_.resize(stride * (height + 2 * apron));
+  values_.resize(stride * (height + 2 * apron) + 1);
   for (std::size_t y = 0; y < height; ++y) {
     const double* from = &relative[y * width];
     float* to = &values_[(y + apron) * stride + apron];
@@ -307,6 +308,13 @@ double HeightMap::height_at(const Vec2& st) const noexcept {
   return base_ + piece.in_t.value(piece.heights());
 }
 
+void HeightMap::heights_at(const Lanes& s, const Lanes& t, Lanes& heights) const noexcept {
+  if (reconstruction_ == Reconstruction::quadratic_bspline &&
+      wide_spline_heights({values_.data(), width_, height_, wrap_, base_}, s, t, heights))
+    return;
+  for (std::size_t i = 0; i < lanes; ++i) heights[i] = height_at(Vec2(s[i], t[i]));
+}
+
 Vec2 HeightMap::central_slope(const Vec2& st) const noexcept {
   const Vec2 ds(1.0 / width_, 0.0);
   const Vec2 dt(0.0, 1.0 / height_);
@@ -352,7 +360,9 @@ HeightCurvature HeightMap::curvature_otherwise(const Vec2& st) const noexcept {
 }
 
 HeightCurvature HeightMap::curvature_bspline(const Vec2& st) const noexcept {
-  HeightCurvature curvature = curvature_of(SplinePiece(stored(), wrap_, st), base_, width_, height_);
+  HeightCurvature curvature;
+  if (!wide_spline_curvature({values_.data(), width_, height_, wrap_, base_}, st, curvature))
+    curvature = curvature_of(SplinePiece(stored(), wrap_, st), base_, width_, height_);
   flatten_outside(curvature, st, wrap_);
   return curvature;
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "asperity/core/lanes.h"
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
 #include "asperity/field/height/image.h"
@@ -104,6 +105,8 @@ class HeightMap {
   [[nodiscard]] HeightSample sample(const Vec2& st) const noexcept;
   /// Height alone (m), equal to `sample`'s to the bit, in a third of the time. [servo]
   [[nodiscard]] double height_at(const Vec2& st) const noexcept;
+  /// The same at several places at once, equal to the bit, by AVX2 where the processor has it. [servo]
+  void heights_at(const Lanes& s, const Lanes& t, Lanes& heights) const noexcept;
 
   /// Slopes by central differences over two texels, m per unit of texture coordinate, whatever the reconstruction.
   /// [any]
@@ -168,7 +171,7 @@ class HeightMap {
   [[nodiscard]] StoredTexels stored() const noexcept { return {values_.data(), width_, height_, reconstruction_}; }
 
   // Rows run with t (bottom row first) inside an apron, which holds what repeat or clamp would answer: no tap ever
-  // needs an index wrapped.
+  // needs an index wrapped. One float to spare behind: rows are read four floats at a time.
   std::vector<float> values_;  // texel heights or B-spline coefficients, m, relative to base_
   double base_ = 0.0;          // m
   RangePyramid ranges_;        // relative to base_

@@ -46,6 +46,11 @@ class Mesostructure {
   [[nodiscard]] double height(const Vec2& st, double level) const noexcept {
     return level <= 0.0 || detail_ == nullptr ? heights_.height_at(st) : mixed_curvature(st, level).height;
   }
+  /// The same at several places at once, equal to the bit. [servo]
+  void heights(const Lanes& s, const Lanes& t, double level, Lanes& heights) const noexcept {
+    if (level <= 0.0 || detail_ == nullptr) return heights_.heights_at(s, t, heights);
+    for (std::size_t i = 0; i < lanes; ++i) heights[i] = mixed_curvature(Vec2(s[i], t[i]), level).height;
+  }
   /// Bounds of that height over a rectangle, as HeightMap::range_over. [servo]
   [[nodiscard]] HeightRange range_over(const Vec2& lower, const Vec2& upper, double level) const noexcept;
   /// A plane that it keeps to, as HeightMap::plane_over. [servo]

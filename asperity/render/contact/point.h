@@ -65,7 +65,7 @@ class PointProxy {
   /// Evaluations that one way along a surface may take.
   static constexpr int most_walk = 1024;
   /// Moves between overlapping folds that one tick may take, over all of its flights.
-  static constexpr int most_moves_of_tick = 48;
+  static constexpr int most_moves_of_tick = 128;
   /// Evaluations of one way along a crease.
   static constexpr int short_walk = 72;
   static constexpr bool may_overlap = requires(const View& v) { v.overlaps(); };

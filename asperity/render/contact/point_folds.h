@@ -8,7 +8,7 @@ namespace asperity {
 
 template <SurfaceView View>
 DescentEnd PointProxy<View>::settle_over_folds() noexcept {
-  constexpr int most_moves = 24;
+  constexpr int most_moves = 64;
   // Along a crease in ever longer moves: where it rests in one, the first is made in vain in every tick.
   constexpr double least_grains = 1.0;
   constexpr double most_grains = 16.0;

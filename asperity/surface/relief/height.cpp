@@ -26,6 +26,34 @@ double ReliefSurface::height_alone(const ReliefFrame& frame, double u, double v)
   return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
 }
 
+void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v,
+                                  Lanes& heights) const noexcept {
+  coat_.heights(frame.coat, u, v, heights);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    if (frame.stitched && in_band(frame, u[i], v[i])) {
+      heights[i] = height_alone(frame, u[i], v[i]);
+    } else if (frame.lowered) {
+      heights[i] *= frame.share + u[i] * frame.share_u + v[i] * frame.share_v;
+    }
+  }
+}
+
+void ReliefSurface::squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& from,
+                                      Lanes& squares) const noexcept {
+  Lanes heights;
+  heights_alone(frame, u, v, heights);
+  const ShellPrism& prism = frame.prism;
+  squares = {};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < lanes; ++i) {
+      const double base = prism.corner[axis] + u[i] * prism.edge_u[axis] + v[i] * prism.edge_v[axis];
+      const double direction = prism.direction[axis] + u[i] * prism.turn_u[axis] + v[i] * prism.turn_v[axis];
+      const double off = base + heights[i] * direction - from[axis];
+      squares[i] += off * off;
+    }
+  }
+}
+
 HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {
   if (!in_band(frame, u, v)) {
     HeightJet jet = coat_.jet(frame.coat, u, v);

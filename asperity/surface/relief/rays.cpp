@@ -104,7 +104,12 @@ class PatchRay {
     while (top > 0) {
       Piece piece = stack[--top];
       Share share;
-      if (passed_over(piece, share)) continue;
+      const bool strip = is_strip(piece, 1.0);
+      if (!strip && passed_over(piece, share)) continue;
+      if (strip || is_strip(piece, share.to - share.from)) {
+        if (solve_strip(piece, share, best)) return best;
+        continue;
+      }
       if (is_leaf(piece)) {
         if (solve(piece, best)) return best;
         continue;
@@ -156,12 +161,18 @@ class PatchRay {
 
   /// Where the curve over a piece is, `share` of the way along it.
   [[nodiscard]] Moment within(const Piece& piece, double share, const ShellPlace& bulge) const noexcept {
+    const Moment thought = near(piece, share, bulge);
+    return at(thought.t, thought.place);
+  }
+
+  /// The same to first order.
+  [[nodiscard]] static Moment near(const Piece& piece, double share, const ShellPlace& bulge) noexcept {
     ShellPlace place = along(piece.from, piece.to, share);
     const double off = share * (1.0 - share);
     place.u += off * bulge.u;
     place.v += off * bulge.v;
     place.height += off * bulge.height;
-    return at(piece.from.t + share * (piece.to.t - piece.from.t), place);
+    return {share == 1.0 ? piece.to.t : piece.from.t + share * (piece.to.t - piece.from.t), place, infinity, false};
   }
 
   [[nodiscard]] Moment halfway(const Piece& piece, const ShellPlace& bulge) const noexcept {
@@ -211,8 +222,7 @@ class PatchRay {
       return true;
     // Over all that the face has anywhere, or below: a look at the part itself is dear.
     if (std::min(a.height, b.height) - bend.height > range_.highest) return true;
-    if (std::max(a.height, b.height) + bend.height < range_.lowest - (piece.from.t == 0.0 ? surface_.skin() : 0.0))
-      return true;
+    if (std::max(a.height, b.height) + bend.height < range_.lowest - room_below(piece)) return true;
     const FacePart part = FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v});
     count_.bounds += surface_.bounds_of(frame(), part);
     const HeightForm form = surface_.form(frame(), part);
@@ -223,12 +233,17 @@ class PatchRay {
     const double off = form.error + bend.height + std::abs(form.u) * bend.u + std::abs(form.v) * bend.v +
                        1e-12 * (std::abs(a.height) + std::abs(b.height) + std::abs(form.height));
     if (std::min(over_from, over_to) > off) return true;
-    const double below = off + (piece.from.t == 0.0 ? surface_.skin() : 0.0);
+    const double below = off + room_below(piece);
     if (std::max(over_from, over_to) < -below) return true;
     share.from = 0.0;
     share.to = 1.0;
     static_cast<void>(cut(over_from, over_to - over_from, -below, off, share.from, share.to));
     return false;
+  }
+
+  /// How far below the relief a piece may start and yet go into it.
+  [[nodiscard]] double room_below(const Piece& piece) const noexcept {
+    return piece.from.t == 0.0 || coming_up_ ? surface_.skin() : 0.0;
   }
 
   /// By how much the curve over a piece is off the straight line between its ends at most, and whether what it is bent
@@ -269,9 +284,18 @@ class PatchRay {
     return extent(piece) <= std::ldexp(1.0, -leaf());
   }
 
+  /// A few leaves whose heights are asked for side by side, in the time that bounding one of them takes. Where
+  /// neighbours have a say a height is dear.
+  [[nodiscard]] bool is_strip(const Piece& piece, double share) const noexcept {
+    if (!piece.from.reached || !piece.to.reached || share * extent(piece) > strip_leaves * std::ldexp(1.0, -leaf()))
+      return false;
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
+    return surface_.bounds_of(frame(), FacePart::line({a.u, a.v}, {b.u, b.v}, Vec2::Zero())) == 1;
+  }
+
   /// The shorter a piece is the straighter is the relief beside it.
   [[nodiscard]] int samples_of(const Piece& piece) const noexcept {
-    constexpr int most_samples = 3;
     constexpr double straight = 1.0 / 16.0;
     if (!piece.from.reached || !piece.to.reached) return most_samples;
     return extent(piece) <= straight * std::ldexp(1.0, -leaf()) ? 1 : most_samples;
@@ -282,6 +306,73 @@ class PatchRay {
     const ShellPlace& a = piece.from.place;
     const ShellPlace& b = piece.to.place;
     return std::max({std::abs(b.u - a.u), std::abs(b.v - a.v), std::abs(b.height - a.height) / per_height_});
+  }
+
+  /// What is between two moments, both with their heights: whether the relief is met.
+  bool met_between(const Moment& before, const Moment& after, PatchHit& best) noexcept {
+    Moment first = before;
+    Moment last = after;
+    if (!keep_over_face(first, last)) return false;
+    // A motion that starts on the surface starts outside it, whatever rounding says; and as long as it only comes up
+    // from there it has not gone in.
+    if (first.t == 0.0) coming_up_ = first.value < 0.0 && first.value >= -surface_.skin();
+    if (coming_up_) {
+      if (last.value < 0.0 && last.value >= first.value) return false;
+      first.value = 0.0;
+      coming_up_ = false;
+    }
+    const bool enters = first.value >= 0.0 && last.value < 0.0;
+    const bool leaves = first.value < 0.0 && last.value >= 0.0;
+    return (enters || (leaves && sides_ == Sides::both)) && close_in(first, last, best);
+  }
+
+  /// As `solve`, over the share of a strip that may meet the relief.
+  bool solve_strip(const Piece& piece, const Share& share, PatchHit& best) noexcept {
+    const double step = (share.to - share.from) * extent(piece) * std::ldexp(1.0, leaf());
+    const int samples = std::max(1, static_cast<int>(std::ceil(most_samples * step)));
+    Moment before = share.from > 0.0 || last_end_.t != piece.from.t ? piece.from : last_end_;
+    int next = share.from > 0.0 ? 0 : 1;
+    if (next > 0) evaluate(before);
+    while (next <= samples) {
+      const int count = std::min(samples + 1 - next, static_cast<int>(lanes));
+      Moment moments[lanes];
+      for (std::size_t i = 0; i < lanes; ++i) {
+        const int sample = next + std::min(static_cast<int>(i), count - 1);
+        const double at = sample == samples ? share.to : share.from + (share.to - share.from) * sample / samples;
+        moments[i] = near(piece, at, share.bulge);
+      }
+      reach(moments);
+      for (int i = 0; i < count; ++i, ++next) {
+        const Moment& after = moments[i];
+        ++count_.evaluations;
+        if (next > 0 && met_between(before, after, best)) return true;
+        before = after;
+      }
+    }
+    if (share.to == 1.0) last_end_ = before;
+    return false;
+  }
+
+  /// Brings moments from where they are thought to be to where they are, with their heights, none of them in a band.
+  void reach(Moment (&moments)[lanes]) const noexcept {
+    std::array<Lanes, 3> points;
+    ShellPlaces places;
+    for (std::size_t i = 0; i < lanes; ++i) {
+      const Vec3 there = segment_.from + moments[i].t * way_;
+      for (std::size_t axis = 0; axis < 3; ++axis) points[axis][i] = there[static_cast<int>(axis)];
+      places.u[i] = moments[i].place.u;
+      places.v[i] = moments[i].place.v;
+      places.height[i] = moments[i].place.height;
+    }
+    prism_.invert(points, places);
+    Lanes heights;
+    surface_.heights_alone(frame(), places.u, places.v, heights);
+    for (std::size_t i = 0; i < lanes; ++i) {
+      moments[i].reached = places.reached[i];
+      if (!places.reached[i]) continue;
+      moments[i].place = {places.u[i], places.v[i], places.height[i]};
+      moments[i].value = places.height[i] - heights[i];
+    }
   }
 
   /// Looks for a change of sign of the height over the relief between samples within a leaf, and closes in on it.
@@ -296,19 +387,7 @@ class PatchRay {
       const double t = i == samples ? to : from + (to - from) * i / samples;
       Moment after = i == samples ? piece.to : sample(piece, before, t);
       evaluate(after);
-      Moment first = before;
-      Moment last = after;
-      if (keep_over_face(first, last)) {
-        // A motion that starts on the surface starts outside it, whatever rounding says; and as long as it only comes
-        // up from there it has not gone in.
-        if (first.t == 0.0 && first.value < 0.0 && first.value >= -surface_.skin()) {
-          if (last.value < 0.0 && last.value >= first.value) continue;
-          first.value = 0.0;
-        }
-        const bool enters = first.value >= 0.0 && last.value < 0.0;
-        const bool leaves = first.value < 0.0 && last.value >= 0.0;
-        if ((enters || (leaves && sides_ == Sides::both)) && close_in(first, last, best)) return true;
-      }
+      if (met_between(before, after, best)) return true;
       before = after;
     }
     last_end_ = before;
@@ -436,6 +515,10 @@ class PatchRay {
     return there;
   }
 
+  // Of a leaf.
+  static constexpr int most_samples = 3;
+  // A strip is so many times as long.
+  static constexpr double strip_leaves = 2.0;
   /// Faces overlap by a hair, so that nothing slips in between (barycentric).
   static constexpr double overlap = 1e-9;
 
@@ -449,7 +532,8 @@ class PatchRay {
   HullPart part_;
   HeightRange range_;  ///< of the heights over all of the face
   Moment last_end_{-1.0, {}, infinity, false};
-  double per_height_;  ///< what a height is measured by, as an edge measures a coordinate (m)
+  bool coming_up_ = false;  ///< started less than a skin below the relief, and has been nowhere over it yet
+  double per_height_;       ///< what a height is measured by, as an edge measures a coordinate (m)
   mutable std::optional<ReliefFrame> frame_;
   mutable int leaf_ = -1;  ///< not known yet
   mutable WorkCount count_{0, 0, 1};

@@ -99,6 +99,8 @@ class ReliefSurface {
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
   /// That height alone (m), to within rounding: where no neighbour has a say, in half the time. [servo]
   [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// The same at several places at once, equal to the bit. [servo]
+  void heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept;
   /// Heights that are asked for there, about: the face's own, and in a band those of the faces around. [servo]
   [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
     constexpr std::uint32_t in_a_band = 4;
@@ -122,6 +124,9 @@ class ReliefSurface {
   [[nodiscard]] Vec3 place(const ReliefFrame& frame, double u, double v) const noexcept {
     return frame.prism.base_at(u, v) + height_alone(frame, u, v) * frame.prism.direction_at(u, v);
   }
+  /// Squared distances (m^2) of such points from another one, several at once. [servo]
+  void squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& from,
+                         Lanes& squares) const noexcept;
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
   [[nodiscard]] HeightRange range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept;
   /// A plane that the height as rendered keeps to over part of the frame's triangle. Where the relief is smooth the

@@ -41,9 +41,12 @@ struct ReliefFaces {
     count.evaluations += surface.heights_at(frame, u, v);
     return surface.point(frame, u, v);
   }
-  [[nodiscard]] double squared_distance(const ReliefFrame& frame, double u, double v, const Vec3& goal) const noexcept {
+  void squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& goal,
+                         Lanes& squares) const noexcept {
+    surface.squared_distances(frame, u, v, goal, squares);
+  }
+  void look(const ReliefFrame& frame, double u, double v) const noexcept {
     count.evaluations += surface.heights_at(frame, u, v);
-    return (surface.place(frame, u, v) - goal).squaredNorm();
   }
   [[nodiscard]] std::uint32_t work() const noexcept { return count.evaluations - before; }
   [[nodiscard]] static WalkForms forms(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& goal) noexcept {
