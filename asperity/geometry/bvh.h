@@ -91,6 +91,10 @@ class Bvh {
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const;
+  /// Calls visit(face) for every triangle that may come within `margin` (m) of the triangle with these corners and this
+  /// unit normal: all but most of those that lie wholly above it, below it or beyond one of its edges by more. [servo]
+  template <class Visit>
+  void for_each_beside(const std::array<Vec3, 3>& corners, const Vec3& normal, double margin, Visit&& visit) const;
   /// Calls visit(face, t_entry) for triangles in leaves that the segment, grown by `radius`, passes, nearest leaf
   /// first, until visit answers a t (0 … 1) below the entry of all that remain. [servo]
   template <class Visit>
@@ -113,6 +117,8 @@ class Bvh {
   static constexpr std::uint32_t leaf_bit = 0x80000000U;
   static constexpr std::uint32_t empty_child = no_index;
   static constexpr int stack_capacity = 256;
+  /// More than a coordinate along a normal of length 1 is rounded, of anything in the hierarchy, in units of scale_.
+  static constexpr double plane_rounding = 6e-6;
 
   struct Node {
     BoxesOf8 boxes;
@@ -133,6 +139,11 @@ class Bvh {
     std::uint32_t child;
   };
   struct LocalSegment;
+  /// A box as the kernels take it, grown by its rounding.
+  [[nodiscard]] FloatBox local_box(const Box& box) const noexcept;
+  /// Calls visit(leaf) for each leaf whose box meets `box`.
+  template <class Visit>
+  void for_each_leaf(const FloatBox& box, Visit&& visit) const;
   class Builder;
   class Fitter;
   class Join;
@@ -141,6 +152,8 @@ class Bvh {
   void frame(const TriangleMesh& mesh) noexcept;
   void fit_avx2(BvhFitting& fitting) noexcept;
   void to_local(const Vec3& p, float local[3]) const noexcept;
+  [[nodiscard]] PlanesAround planes_around(const std::array<Vec3, 3>& corners, const Vec3& normal,
+                                           double margin) const noexcept;
   [[nodiscard]] LocalSegment local_segment(const Segment& segment) const noexcept;
   template <class Boxes, class Meets, class TakeLeaf>
   void descend(float& limit, const Boxes& boxes, const Meets& meets, const TakeLeaf& leaf) const;

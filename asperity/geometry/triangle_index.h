@@ -61,6 +61,19 @@ class TriangleIndex {
   void for_each_in_box(const Box& box, Visit&& visit) const {
     std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, inside_->structure);
   }
+  /// Calls visit(face) for every triangle that may come within `margin` (m) of a face, itself included: with a
+  /// hierarchy all but most of those that lie wholly above it, below it or beyond one of its edges by more. [servo]
+  template <class Visit>
+  void for_each_beside(std::uint32_t face, double margin, Visit&& visit) const {
+    const std::array<Vec3, 3> corners = mesh().corners(face);
+    if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) {
+      bvh->for_each_beside(corners, mesh().face_normal(face), margin, visit);
+      return;
+    }
+    Box box;
+    for (const Vec3& corner : corners) box.include(corner);
+    for_each_in_box(box.grown(margin), visit);
+  }
   /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet (m; one for each
   /// triangle, around it), and perhaps for some that miss each other by a rounding; in no order, and from several
   /// threads at a time. `enclosed`: of the boxes. [build]
