@@ -74,10 +74,9 @@ class TriangleIndex {
     for (const Vec3& corner : corners) box.include(corner);
     for_each_in_box(box.grown(margin), visit);
   }
-  /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet (m; one for each
-  /// triangle, around it), and perhaps for some that miss each other by a rounding; in no order, and from several
-  /// threads at a time. `enclosed`: of the boxes. [build]
-  void for_each_meeting(std::span<const Box> boxes, const FaceBoxes& enclosed, const MeetingVisit& visit) const;
+  /// Calls visit(one, others) so that every pair of triangles without a common vertex whose boxes meet comes up once,
+  /// and perhaps some that miss each other by a rounding; in no order, and from several threads at a time. [build]
+  void for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const;
   /// Calls visit(face), roughly from near to far, for every triangle whose bounding box grown by `radius` (m) the
   /// segment meets; visit answers the fraction of the segment beyond which nothing is wanted any more. [servo]
   template <class Visit>
@@ -94,8 +93,9 @@ class TriangleIndex {
     });
   }
 
-  /// Boxes, one a triangle and around it (m), to be searched instead of the triangles. [build]
-  [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
+  /// Boxes, one a triangle and around it, to be searched instead of the triangles; never too small. Each thread takes
+  /// about `grain` triangles at a time. [build]
+  [[nodiscard]] FaceBoxes enclosed(const BoxesOver& over, std::size_t grain = 2048) const;
   /// for_each_along for the triangles whose boxes the segment meets, and perhaps some more. [servo]
   template <class Visit>
   void for_each_along(const Segment& segment, const FaceBoxes& boxes, Visit&& visit) const {

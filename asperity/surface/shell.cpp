@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "asperity/core/parallel_for.h"
@@ -21,22 +22,24 @@ struct WeightedNormal {
   double weight;
 };
 
+using NormalsAround = std::span<const WeightedNormal>;
+
 /// `corners`: of all faces. `around` is filled anew.
-void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const std::vector<FaceCorners>& corners,
+void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, std::span<const FaceCorners> corners,
                          std::vector<WeightedNormal>& around) {
   around.clear();
   for (const std::uint32_t face : mesh.faces_of_vertex(vertex))
     around.push_back({corners[face].normal, corners[face].angle[mesh.corner_of(face, vertex)]});
 }
 
-double least_normal_product(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+double least_normal_product(NormalsAround around, const Vec3& direction) {
   double least = infinity;
   for (const WeightedNormal& face : around) least = std::min(least, face.normal.dot(direction));
   return least;
 }
 
 /// Length that brings N . n to 1 in the mean of squares, for a given direction.
-Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+Vec3 scaled(NormalsAround around, const Vec3& direction) {
   double once = 0.0;
   double twice = 0.0;
   for (const WeightedNormal& face : around) {
@@ -49,7 +52,7 @@ Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
 }
 
 /// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings).
-Vec3 least_squares(const std::vector<WeightedNormal>& around, const Vec3& normal) {
+Vec3 least_squares(NormalsAround around, const Vec3& normal) {
   constexpr double hold = 1e-3;
   // The matrix is symmetric: its upper half.
   double xx = 0.0;
@@ -85,7 +88,7 @@ Vec3 least_squares(const std::vector<WeightedNormal>& around, const Vec3& normal
 }
 
 /// The direction whose least product with the normals around is largest, by pulling towards the worst one.
-Vec3 most_seen(const std::vector<WeightedNormal>& around, const Vec3& start) {
+Vec3 most_seen(NormalsAround around, const Vec3& start) {
   Vec3 best = start;
   double best_product = least_normal_product(around, start);
   Vec3 direction = start;
@@ -159,28 +162,34 @@ int cubic_roots(double a, double b, double c, double d, double roots[3]) noexcep
   return 3;
 }
 
-/// Moves each direction towards the mean of its neighbours' as far as every face around still sees it.
-void relax(const TriangleMesh& mesh, const std::vector<std::vector<WeightedNormal>>& around,
-           std::vector<Vec3>& directions) {
+/// Moves each direction towards the mean of its neighbours' as far as every face around still sees it. `corners`: of
+/// all faces.
+void relax(const TriangleMesh& mesh, std::span<const FaceCorners> corners, std::vector<Vec3>& directions) {
   constexpr int rounds = 30;
-  std::vector<Vec3> sum(directions.size());
-  std::vector<double> count(directions.size());
+  const ParallelSettings shares{.grain = 1024};
+  std::vector<std::vector<WeightedNormal>> scratch(parallel_workers(directions.size(), shares));
+  std::vector<Vec3> next(directions.size());
   for (int round = 0; round < rounds; ++round) {
-    std::fill(sum.begin(), sum.end(), Vec3::Zero());
-    std::fill(count.begin(), count.end(), 0.0);
-    for (const TriangleMesh::Triangle& t : mesh.triangles()) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        sum[t[k]] += directions[t[(k + 1) % 3]] + directions[t[(k + 2) % 3]];
-        count[t[k]] += 2.0;
+    parallel_for(directions.size(), shares, [&](std::size_t i, unsigned worker) {
+      const auto vertex = static_cast<std::uint32_t>(i);
+      std::vector<WeightedNormal>& around = scratch[worker];
+      find_normals_around(mesh, vertex, corners, around);
+      next[i] = directions[i];
+      if (around.empty()) return;
+      Vec3 sum = Vec3::Zero();
+      double count = 0.0;
+      for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+        const TriangleMesh::Triangle& t = mesh.triangles()[face];
+        const std::size_t k = mesh.corner_of(face, vertex);
+        sum += directions[t[(k + 1) % 3]] + directions[t[(k + 2) % 3]];
+        count += 2.0;
       }
-    }
-    for (std::size_t i = 0; i < directions.size(); ++i) {
-      if (count[i] == 0.0) continue;
-      const Vec3 moved = scaled(around[i], (directions[i] + sum[i] / count[i]).normalized());
+      const Vec3 moved = scaled(around, (directions[i] + sum / count).normalized());
       // A height over each face may then differ from the metric one by a third at most.
-      if (least_normal_product(around[i], moved) > std::min(0.67, 0.9 * least_normal_product(around[i], directions[i])))
-        directions[i] = moved;
-    }
+      if (least_normal_product(around, moved) > std::min(0.67, 0.9 * least_normal_product(around, directions[i])))
+        next[i] = moved;
+    });
+    std::swap(directions, next);
   }
 }
 
@@ -289,8 +298,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   const bool relaxed = how == ShellDirections::relaxed;
   shell.directions.resize(count);
   std::vector<Vec3> directions(relaxed ? count : 0);
-  std::vector<std::vector<WeightedNormal>> around(relaxed ? count : 0);
-  const std::vector<FaceCorners> corners = mesh.face_corners();
+  const UnsetVector<FaceCorners> corners = mesh.face_corners();
   const ParallelSettings shares{.grain = 1024};
   struct Found {
     std::vector<WeightedNormal> around;  ///< scratch
@@ -315,9 +323,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
       }
     }
     shell.directions[i] = direction.cast<float>();
-    if (!relaxed) return;
-    directions[i] = direction;
-    around[i] = here;
+    if (relaxed) directions[i] = direction;
   });
   for (const Found& one : found) {
     shell.turned_vertices += one.turned;
@@ -325,7 +331,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   }
   std::sort(shell.blind_vertices.begin(), shell.blind_vertices.end());
   if (!relaxed) return shell;
-  relax(mesh, around, directions);
+  relax(mesh, corners, directions);
   for (std::size_t i = 0; i < count; ++i) shell.directions[i] = directions[i].cast<float>();
   return shell;
 }
