@@ -49,6 +49,16 @@ ASPERITY_INLINE unsigned meeting(const BoxesOf8& boxes, const FloatBox& box) {
   return bits_of(all);
 }
 
+/// Of one thread: a cache line of its own, or writing it would hold up the others.
+struct alignas(64) Farthest {
+  double value = 0.0;
+};
+double farthest_of(const std::vector<Farthest>& all) {
+  double most = 0.0;
+  for (const Farthest& one : all) most = std::max(most, one.value);
+  return most;
+}
+
 /// How far a box reaches beyond a triangle's own (m).
 double beyond(const TriangleMesh& mesh, std::uint32_t face, const Box& box) {
   Box own;
@@ -166,33 +176,28 @@ class Bvh::Join {
 };
 
 FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
-  // In the hierarchy's own units, grown by more than their rounding: four of a box's six numbers at a time.
+  // In the hierarchy's own units, grown by more than their rounding.
   using Four = double __attribute__((vector_size(32)));
   using FourFloats = float __attribute__((vector_size(16)));
-  const auto local = [&](const double* from, const Four& origin, float sign) {
-    Four at;
-    std::memcpy(&at, from, sizeof(at));
+  const auto local = [&](const Four& at, const Four& origin, float sign) {
     const FourFloats x = __builtin_convertvector((at - origin) * per_scale_, FourFloats);
     const FourFloats size = x < 0.0F ? -x : x;
     return x + sign * (1e-6F * (1.0F + size));
   };
-  static_assert(sizeof(Box) == 6 * sizeof(double));
-  const Four of_lower = {origin_.x(), origin_.y(), origin_.z(), 0.0};
-  const Four of_upper = {0.0, origin_.x(), origin_.y(), origin_.z()};
+  const Four origin = {origin_.x(), origin_.y(), origin_.z(), 0.0};
   const auto set = [&](BoxesOf8& to, std::size_t slot, const Box& box) {
-    double numbers[6];
-    std::memcpy(numbers, &box, sizeof(box));
-    const FourFloats lower = local(numbers, of_lower, -1.0F);
-    const FourFloats upper = local(numbers + 2, of_upper, 1.0F);
+    // One by one, as they have just been written.
+    const FourFloats lower = local(Four{box.lower.x(), box.lower.y(), box.lower.z(), 0.0}, origin, -1.0F);
+    const FourFloats upper = local(Four{box.upper.x(), box.upper.y(), box.upper.z(), 0.0}, origin, 1.0F);
     for (int axis = 0; axis < 3; ++axis) {
       to.lower[axis][slot] = lower[axis];
-      to.upper[axis][slot] = upper[axis + 1];
+      to.upper[axis][slot] = upper[axis];
     }
   };
   FaceBoxes all{UnsetVector<BoxesOf8>(leaves_.size()), UnsetVector<BoxesOf8>(nodes_.size()), {}};
   UnsetVector<FloatBox> whole(leaves_.size());
   const ParallelSettings shares{.grain = std::max<std::size_t>(1, grain / 8)};
-  std::vector<double> farther(parallel_workers(leaves_.size(), shares), 0.0);
+  std::vector<Farthest> farther(parallel_workers(leaves_.size(), shares));
   parallel_for(leaves_.size(), shares, [&](std::size_t leaf, unsigned worker) {
     const auto used = [&](std::size_t of) {
       const std::uint32_t(&faces)[8] = leaves_[std::min(of, leaves_.size() - 1)].face;
@@ -201,14 +206,16 @@ FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
     const std::span<const std::uint32_t> faces = used(leaf);
     Box boxes[8];
     over(faces, used(leaf + 2), {boxes, faces.size()});
+    double most = 0.0;
     for (std::size_t i = 0; i < 8; ++i) {
       if (i >= faces.size()) {
         all.leaves[leaf].set(i, FloatBox{});
         continue;
       }
       set(all.leaves[leaf], i, boxes[i]);
-      farther[worker] = std::max(farther[worker], beyond(*mesh_, faces[i], boxes[i]));
+      most = std::max(most, beyond(*mesh_, faces[i], boxes[i]));
     }
+    farther[worker].value = std::max(farther[worker].value, most);
     whole[leaf] = around(all.leaves[leaf]);
   });
   UnsetVector<FloatBox> below(nodes_.size());
@@ -220,7 +227,7 @@ FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
     }
     below[node] = around(all.nodes[node]);
   }
-  all.farther = farther.empty() ? 0.0 : *std::max_element(farther.begin(), farther.end());
+  all.farther = farthest_of(farther);
   return all;
 }
 
@@ -243,15 +250,15 @@ FaceBoxes TriangleIndex::enclosed(const BoxesOver& over, std::size_t grain) cons
   if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->enclosed(over, grain);
   const std::size_t count = mesh().triangles().size();
   const ParallelSettings shares{.grain = grain};
-  std::vector<double> farther(parallel_workers(count, shares), 0.0);
+  std::vector<Farthest> farther(parallel_workers(count, shares));
   FaceBoxes all;
   all.faces = UnsetVector<Box>(count);
   parallel_for(count, shares, [&](std::size_t i, unsigned worker) {
     const auto face = static_cast<std::uint32_t>(i);
     over({&face, 1}, {}, {&all.faces[i], 1});
-    farther[worker] = std::max(farther[worker], beyond(mesh(), face, all.faces[i]));
+    farther[worker].value = std::max(farther[worker].value, beyond(mesh(), face, all.faces[i]));
   });
-  all.farther = *std::max_element(farther.begin(), farther.end());
+  all.farther = farthest_of(farther);
   return all;
 }
 

@@ -44,18 +44,9 @@ __attribute__((target("avx2"))) unsigned holds_four_avx2(const TriangleMesh& mes
 }
 #endif
 
-bool has_avx2() noexcept {
-#if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  return wide;
-#else
-  return false;
-#endif
-}
-
 HoldsFour best_holds_four() noexcept {
 #if defined(__x86_64__)
-  if (has_avx2()) return holds_four_avx2;
+  if (four::has_avx2()) return holds_four_avx2;
 #endif
   return holds_four_plain;
 }
@@ -76,7 +67,7 @@ class ReliefSurface::EnclosedByFour {
   /// Writes their ranges and boxes.
   void run(const std::uint32_t (&faces)[4], Box* const (&boxes)[4]) const {
 #if defined(__x86_64__)
-    if (has_avx2()) return run_avx2(faces, boxes);
+    if (four::has_avx2()) return run_avx2(faces, boxes);
 #endif
     enclose(faces, boxes);
   }
