@@ -176,7 +176,8 @@ DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal)
   Walk<FaceChart<FlatFaces>> walk(chart, goal, place.side());
   const DescentEnd end = walk.run();
   tell(cache_->work, {walk.moves(), 0, chart.frames()});
-  if (at.frame.face == place.element) look_ahead(*surface_, at, at.u - place.at[1], at.v - place.at[2], cache_->ahead);
+  if (walk.moves() > 0 && at.frame.face == place.element)
+    look_ahead(*surface_, at, at.u - place.at[1], at.v - place.at[2], cache_->ahead);
   place.element = at.frame.face;
   place.at = {1.0 - at.u - at.v, at.u, at.v};
   return blocked ? DescentEnd::blocked : end;
