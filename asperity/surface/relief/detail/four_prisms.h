@@ -19,7 +19,7 @@ struct Prisms {
   Vectors turn_v;
 };
 
-/// Shell::prism, four times.
+/// Shell::prism, four times. [build]
 ASPERITY_FOUR void gather(const TriangleMesh& mesh, const Shell& shell, const std::uint32_t* const faces, Prisms& out) {
   const Vec3* const positions = mesh.positions().data();
   const Vec3f* const directions = shell.directions.data();
@@ -44,7 +44,7 @@ ASPERITY_FOUR void gather(const TriangleMesh& mesh, const Shell& shell, const st
   }
 }
 
-/// ShellPrism::holds, four times: a bit each.
+/// ShellPrism::holds, four times: a bit each. [build]
 ASPERITY_FOUR unsigned holds(const Prisms& prisms, double margin, double limit) {
   Vectors c0;
   Vectors c1;
@@ -96,7 +96,7 @@ struct Boxes {
   }
 };
 
-/// box_around, four times.
+/// box_around, four times. [build]
 ASPERITY_FOUR void box_around(const Prisms& prisms, const Lanes& lowest, const Lanes& highest, Boxes& box) {
   for (int k = 0; k < 3; ++k) {
     Vectors low;
@@ -122,7 +122,7 @@ struct Forms {
   Lanes error;
 };
 
-/// The box around what bound_over makes of all of a face, four times.
+/// The box around what bound_over makes of all of a face, four times. [build]
 ASPERITY_FOUR void box_around(const Prisms& prisms, const Forms& form, const FacePart& whole, Boxes& box) {
   Vectors direction;
   Vectors middle;
