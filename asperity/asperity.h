@@ -24,6 +24,7 @@
 #include "asperity/core/suggest.h"
 #include "asperity/core/trace_record.h"
 #include "asperity/core/units.h"
+#include "asperity/core/unset_vector.h"
 #include "asperity/core/work.h"
 
 // geometry: triangle meshes and how they are searched

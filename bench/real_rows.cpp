@@ -11,12 +11,19 @@
 #include "asperity/core/rng.h"
 #include "asperity/io/experiment.h"
 #include "asperity/render/step.h"
+#include "bench/embree_peer.h"
 
 namespace asperity::bench {
 
 namespace {
 
 constexpr double dt = 1e-3;  // s
+// Of bare meshes: what a tracker that knows the last distance would search within (m), and how often each tick is
+// timed.
+constexpr double peer_bound = 3e-3;
+constexpr int peer_passes = 5;
+constexpr const char* bare_law = "god-object";
+constexpr const char* peer_law = "Embree, 3 mm start radius";
 
 // ---- bodies
 
@@ -26,6 +33,7 @@ struct Body {
   std::string file;     ///< that has to be there, under the data's folder; empty: none
   bool volume = false;
   double highest = 0.0;  ///< m, of its relief
+  bool bare = false;     ///< a mesh without a coat, beside Embree
 };
 
 std::vector<Body> bodies() {
@@ -54,6 +62,10 @@ std::vector<Body> bodies() {
                        mesh.file, false, 1e-3 * height});
       }
     }
+  }
+  for (const Mesh& mesh : meshes) {
+    all.push_back({fmt::format("{}, bare", mesh.name), fmt::format(R"({{"mesh":"{}"}})", mesh.file), mesh.file, false,
+                   0.0, true});
   }
   all.push_back({"vase", R"({"volume":"volumes/vase.vti"})", "volumes/vase.vti", true, 0.0});
   all.push_back({"carotid", R"({"volume":"volumes/carotid.vtk"})", "volumes/carotid.vtk", true, 0.0});
@@ -280,9 +292,60 @@ void run(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, R
   }
 }
 
+/// Of each tick the least of several passes, which what else the machine does meets hardly ever: `start` begins a pass,
+/// update(tick) answers whether it touched or found something.
+template <class Start, class Update>
+void run_passes(std::size_t ticks, double clock_cost, const Start& start, const Update& update, RealRow& row) {
+  std::vector<Clock::duration> least(ticks, Clock::duration::max());
+  std::vector<std::uint8_t> answered(ticks, 0);
+  for (int pass = 0; pass < peer_passes; ++pass) {
+    start();
+    for (std::size_t tick = 0; tick < ticks; ++tick) {
+      const Clock::time_point began = Clock::now();
+      answered[tick] = update(tick) ? 1 : 0;
+      least[tick] = std::min(least[tick], Clock::now() - began);
+    }
+  }
+  Samples samples;
+  samples.reserve(ticks);
+  for (std::size_t tick = 0; tick < ticks; ++tick) samples.add(least[tick], answered[tick] != 0);
+  row.times = samples.summary(clock_cost);
+  row.worst_again = row.times.max;
+  row.contact_share = samples.answered_share();
+}
+
+/// A bare mesh by the god-object, and Embree's point query at the same places.
+void run_bare(const Scene& scene, const std::vector<Vec3>& path, double clock_cost, RealRow& row) {
+  if (row.law == peer_law) {
+    const EmbreePeer peer(base_of(scene.instances().front().surface)->mesh());
+    run_passes(
+        path.size(), clock_cost, [] {},
+        [&](std::size_t tick) { return std::isfinite(peer.closest(path[tick], peer_bound)); }, row);
+    return;
+  }
+  ProxyState state;
+  ProxyCache cache;
+  ProbeSample probe;
+  const auto start = [&] {
+    state = {};
+    cache = {};
+    row.not_converged = 0;
+  };
+  const auto update = [&](std::size_t tick) {
+    probe.twist.linear = tick > 0 ? Vec3((path[tick] - path[tick - 1]) / dt) : Vec3(Vec3::Zero());
+    probe.pose.position = path[tick];
+    probe.time = Seconds(dt * static_cast<double>(tick));
+    const ForceSample felt = step(scene, state, cache, probe, Seconds(dt));
+    row.not_converged += felt.flags.has(TickFlag::not_converged) ? 1U : 0U;
+    return felt.flags.has(TickFlag::contact);
+  };
+  run_passes(path.size(), clock_cost, start, update, row);
+}
+
 /// What goes with a body.
 std::vector<std::string> laws_for(const Body& body) {
   if (body.name == "bunny, potential") return {"proxy", "virtual-contact-point", "magnetic"};
+  if (body.bare) return {bare_law, peer_law};
   if (body.volume) return {"proxy", "cross-uncross", "avila"};
   return {"proxy",         "proxy, friction",       "god-object", "force-shading", "height-field",
           "mesostructure", "mesostructure-intended"};
@@ -292,7 +355,8 @@ Result<Experiment> read(const Body& body, const std::string& law, const std::fil
   std::string surface = body.surface;
   surface.pop_back();
   const bool friction = law == "proxy, friction";
-  surface += fmt::format(R"(,"law":"{}")", friction ? "proxy" : law);
+  const char* const other = law == peer_law ? bare_law : law.c_str();
+  surface += fmt::format(R"(,"law":"{}")", friction ? "proxy" : other);
   if (friction) surface += R"(,"material":{"static_friction":0.4,"dynamic_friction":0.3})";
   const std::string scene = fmt::format(R"({{"surfaces":[{}}}]}})", surface);
   return parse_experiment(scene, data, body.name);
@@ -313,14 +377,14 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
     // Every stroke by one law at least, the proxy by every second; so that all pairs of strokes and laws come up.
     std::vector<std::pair<std::string, std::string>> pairs;
     for (std::size_t s = 0; s < std::size(real_strokes); ++s) {
-      if (effort.every) {
+      if (effort.every || body.bare) {
         for (const std::string& law : laws) pairs.emplace_back(real_strokes[s], law);
       } else {
         if ((number + s) % 2 == 0) pairs.emplace_back(real_strokes[s], "proxy");
         if ((number + s) % 3 == 0) pairs.emplace_back(real_strokes[s], laws[1 + (number + s / 3) % (laws.size() - 1)]);
       }
     }
-    pairs.emplace_back("beside a wall", "proxy");
+    if (!body.bare) pairs.emplace_back("beside a wall", "proxy");
     ++number;
     std::optional<Experiment> read_by;
     std::string last_law;
@@ -349,7 +413,8 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
       SceneSettings settings;
       settings.budget = effort.budget;
       ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), settings));
-      run(scene, led(led_as, carrier, body.highest, effort.ticks, 17, instances.size() > 1), clock_cost, row);
+      const std::vector<Vec3> path = led(led_as, carrier, body.highest, effort.ticks, 17, led_as != stroke);
+      (body.bare ? run_bare : run)(scene, path, clock_cost, row);
       told(fmt::format("{}, {}, {}: p99.9 {:.1f} us, worst {:.1f} us again {:.1f}", body.name, stroke, law,
                        1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
       rows.push_back(std::move(row));
@@ -388,6 +453,24 @@ std::string sum_up(const std::string& of, const std::vector<RealRow>& rows) {
                      longest);
 }
 
+/// Bare meshes: the god-object's p99.9 against Embree's.
+std::string beside_embree(const std::vector<RealRow>& rows) {
+  std::string text;
+  for (const RealRow& ours : rows) {
+    if (ours.law != bare_law) continue;
+    const auto theirs = std::find_if(rows.begin(), rows.end(), [&](const RealRow& row) {
+      return row.law == peer_law && row.body == ours.body && row.stroke == ours.stroke;
+    });
+    if (theirs == rows.end()) continue;
+    text += fmt::format("{:<32} {:<16} {:>9.2f} {:>9.2f} {:>6.2f}\n", ours.body, ours.stroke, 1e-3 * ours.times.p999,
+                        1e-3 * theirs->times.p999, ours.times.p999 / theirs->times.p999);
+  }
+  if (text.empty()) return text;
+  return fmt::format("\nBare meshes, p99.9 of each tick's least of {} passes, us:\n{:<32} {:<16} {:>9} {:>9} {:>6}\n",
+                     peer_passes, "body", "stroke", "god-obj.", "Embree", "ratio") +
+         text;
+}
+
 }  // namespace
 
 std::string real_text(const std::vector<RealRow>& rows) {
@@ -412,7 +495,7 @@ std::string real_text(const std::vector<RealRow>& rows) {
                       "dearest p99.9", "slowest kept", "dearest tick", "not c.", "open", "run");
   for (const char* body : {"bunny-28k", "spot", "FlightHelmet", "vase", "carotid", "cavity", "bunny, potential", ""})
     text += sum_up(body, rows);
-  return text;
+  return text + beside_embree(rows);
 }
 
 }  // namespace asperity::bench

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "asperity/core/unset_vector.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/mesh.h"
 #include "asperity/geometry/simd_kernels.h"
@@ -19,8 +20,12 @@ struct BvhSettings {
   bool plain_kernels = false;  ///< plain C++ in place of AVX2: the oracle
 };
 
-/// Takes a pair of triangles; may be called from several threads at a time.
-using MeetingVisit = std::function<void(std::uint32_t, std::uint32_t)>;
+/// Takes a triangle and those that it was paired with; called from several threads at a time.
+using MeetingVisit = std::function<void(std::uint32_t, std::span<const std::uint32_t>)>;
+/// Writes boxes (m) around what stands over a few triangles, one for each, and is told which are likely to come next;
+/// called from several threads at a time, once for each triangle.
+using BoxesOver = std::function<void(std::span<const std::uint32_t> faces, std::span<const std::uint32_t> next,
+                                     std::span<Box> boxes)>;
 
 /// Where refitting finds the corners of each leaf's triangles in a row, and room for what it measures. [build]
 struct BvhFitting {
@@ -35,11 +40,12 @@ struct BvhFitting {
 /// Boxes around what stands over each triangle, in the order of a hierarchy over the triangles: what is searched for
 /// may be larger than they are. [build]
 struct FaceBoxes {
-  std::vector<BoxesOf8> leaves;
-  std::vector<BoxesOf8> nodes;
-  double farther = 0.0;  ///< how far they reach beyond the triangles' own boxes at most (m)
+  UnsetVector<BoxesOf8> leaves;
+  UnsetVector<BoxesOf8> nodes;
+  UnsetVector<Box> faces;  ///< without a hierarchy (m), by the triangles' numbers
+  double farther = 0.0;    ///< how far they reach beyond the triangles' own boxes at most (m)
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return (leaves.capacity() + nodes.capacity()) * sizeof(BoxesOf8);
+    return (leaves.capacity() + nodes.capacity()) * sizeof(BoxesOf8) + faces.capacity() * sizeof(Box);
   }
 };
 
@@ -83,14 +89,17 @@ class Bvh {
     return static_cast<double>(rounding(local)) * scale_;
   }
 
-  /// Boxes, one a triangle (m), ready to be searched; never too small. [build]
-  [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
-  /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet, and perhaps for
-  /// some that miss each other by a rounding; in no order, and from several threads at a time. [build]
+  /// See TriangleIndex::enclosed. [build]
+  [[nodiscard]] FaceBoxes enclosed(const BoxesOver& over, std::size_t grain) const;
+  /// See TriangleIndex::for_each_meeting. [build]
   void for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const;
   /// Calls visit(face) for each triangle in a leaf whose box meets `box`; once for each triangle. [servo]
   template <class Visit>
   void for_each_in_box(const Box& box, Visit&& visit) const;
+  /// Calls visit(face) for every triangle that may come within `margin` (m) of the triangle with these corners and this
+  /// unit normal: all but most of those that lie wholly above it, below it or beyond one of its edges by more. [servo]
+  template <class Visit>
+  void for_each_beside(const std::array<Vec3, 3>& corners, const Vec3& normal, double margin, Visit&& visit) const;
   /// Calls visit(face, t_entry) for triangles in leaves that the segment, grown by `radius`, passes, nearest leaf
   /// first, until visit answers a t (0 … 1) below the entry of all that remain. [servo]
   template <class Visit>
@@ -113,6 +122,8 @@ class Bvh {
   static constexpr std::uint32_t leaf_bit = 0x80000000U;
   static constexpr std::uint32_t empty_child = no_index;
   static constexpr int stack_capacity = 256;
+  /// More than a coordinate along a normal of length 1 is rounded, of anything in the hierarchy, in units of scale_.
+  static constexpr double plane_rounding = 6e-6;
 
   struct Node {
     BoxesOf8 boxes;
@@ -133,6 +144,11 @@ class Bvh {
     std::uint32_t child;
   };
   struct LocalSegment;
+  /// A box as the kernels take it, grown by its rounding.
+  [[nodiscard]] FloatBox local_box(const Box& box) const noexcept;
+  /// Calls visit(leaf) for each leaf whose box meets `box`.
+  template <class Visit>
+  void for_each_leaf(const FloatBox& box, Visit&& visit) const;
   class Builder;
   class Fitter;
   class Join;
@@ -141,6 +157,8 @@ class Bvh {
   void frame(const TriangleMesh& mesh) noexcept;
   void fit_avx2(BvhFitting& fitting) noexcept;
   void to_local(const Vec3& p, float local[3]) const noexcept;
+  [[nodiscard]] PlanesAround planes_around(const std::array<Vec3, 3>& corners, const Vec3& normal,
+                                           double margin) const noexcept;
   [[nodiscard]] LocalSegment local_segment(const Segment& segment) const noexcept;
   template <class Boxes, class Meets, class TakeLeaf>
   void descend(float& limit, const Boxes& boxes, const Meets& meets, const TakeLeaf& leaf) const;

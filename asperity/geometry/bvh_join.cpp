@@ -49,13 +49,36 @@ ASPERITY_INLINE unsigned meeting(const BoxesOf8& boxes, const FloatBox& box) {
   return bits_of(all);
 }
 
-FloatBox around(const BoxesOf8& boxes) {
+/// Of one thread: a cache line of its own, or writing it would hold up the others.
+struct alignas(64) Farthest {
+  double value = 0.0;
+};
+double farthest_of(const std::vector<Farthest>& all) {
+  double most = 0.0;
+  for (const Farthest& one : all) most = std::max(most, one.value);
+  return most;
+}
+
+/// How far a box reaches beyond a triangle's own (m).
+double beyond(const TriangleMesh& mesh, std::uint32_t face, const Box& box) {
+  Box own;
+  for (const Vec3& corner : mesh.corners(face)) own.include(corner);
+  return std::max((own.lower - box.lower).maxCoeff(), (box.upper - own.upper).maxCoeff());
+}
+
+/// Of eight numbers the one that `choose` prefers.
+template <class Choose>
+ASPERITY_INLINE float best_of(const float (&eight)[8], const Choose& choose) {
+  float four[4];
+  for (int i = 0; i < 4; ++i) four[i] = choose(eight[i], eight[i + 4]);
+  return choose(choose(four[0], four[2]), choose(four[1], four[3]));
+}
+
+ASPERITY_INLINE FloatBox around(const BoxesOf8& boxes) {
   FloatBox all;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < 8; ++i) {
-      all.lower[axis] = std::min(all.lower[axis], boxes.lower[axis][i]);
-      all.upper[axis] = std::max(all.upper[axis], boxes.upper[axis][i]);
-    }
+    all.lower[axis] = best_of(boxes.lower[axis], [](float a, float b) { return b < a ? b : a; });
+    all.upper[axis] = best_of(boxes.upper[axis], [](float a, float b) { return a < b ? b : a; });
   }
   return all;
 }
@@ -74,7 +97,7 @@ class Bvh::Join {
       }
     });
     // Each leaf is joined with those that come after it: a subtree whose leaves all come before has nothing to offer.
-    last_leaf_.resize(nodes_.size());
+    last_leaf_ = UnsetVector<std::uint32_t>(nodes_.size());
     for (std::size_t node = nodes_.size(); node-- > 0;) {
       std::uint32_t last = 0;
       for (const std::uint32_t child : bvh.nodes_[node].child) {
@@ -123,8 +146,11 @@ class Bvh::Join {
       // Within one leaf, with those that come after.
       unsigned met = meeting(leaves_[other], slot(leaves_[one], i)) & (one == other ? ~1U << i : ~0U);
       if (met == 0) continue;
+      std::uint32_t others[8];
+      std::size_t count = 0;
       for (met &= ~neighbours(corners_[other], corners_[one], i); met != 0; met &= met - 1)
-        visit(bvh_.leaves_[one].face[i], bvh_.leaves_[other].face[__builtin_ctz(met)]);
+        others[count++] = bvh_.leaves_[other].face[__builtin_ctz(met)];
+      if (count > 0) visit(bvh_.leaves_[one].face[i], {others, count});
     }
   }
 
@@ -143,58 +169,65 @@ class Bvh::Join {
   }
 
   const Bvh& bvh_;
-  const std::vector<BoxesOf8>& leaves_;
-  const std::vector<BoxesOf8>& nodes_;
-  std::vector<CornersOf8> corners_;
-  std::vector<std::uint32_t> last_leaf_;  ///< below each node
+  const UnsetVector<BoxesOf8>& leaves_;
+  const UnsetVector<BoxesOf8>& nodes_;
+  UnsetVector<CornersOf8> corners_;
+  UnsetVector<std::uint32_t> last_leaf_;  ///< below each node
 };
 
-FaceBoxes Bvh::enclosed(std::span<const Box> boxes) const {
-  // In the hierarchy's own units, grown by more than their rounding: four of a box's six numbers at a time.
+FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
+  // In the hierarchy's own units, grown by more than their rounding.
   using Four = double __attribute__((vector_size(32)));
   using FourFloats = float __attribute__((vector_size(16)));
-  const auto local = [&](const double* from, const Four& origin, float sign) {
-    Four at;
-    std::memcpy(&at, from, sizeof(at));
+  const auto local = [&](const Four& at, const Four& origin, float sign) {
     const FourFloats x = __builtin_convertvector((at - origin) * per_scale_, FourFloats);
     const FourFloats size = x < 0.0F ? -x : x;
     return x + sign * (1e-6F * (1.0F + size));
   };
-  static_assert(sizeof(Box) == 6 * sizeof(double));
-  const Four of_lower = {origin_.x(), origin_.y(), origin_.z(), 0.0};
-  const Four of_upper = {0.0, origin_.x(), origin_.y(), origin_.z()};
+  const Four origin = {origin_.x(), origin_.y(), origin_.z(), 0.0};
   const auto set = [&](BoxesOf8& to, std::size_t slot, const Box& box) {
-    double numbers[6];
-    std::memcpy(numbers, &box, sizeof(box));
-    const FourFloats lower = local(numbers, of_lower, -1.0F);
-    const FourFloats upper = local(numbers + 2, of_upper, 1.0F);
+    // One by one, as they have just been written.
+    const FourFloats lower = local(Four{box.lower.x(), box.lower.y(), box.lower.z(), 0.0}, origin, -1.0F);
+    const FourFloats upper = local(Four{box.upper.x(), box.upper.y(), box.upper.z(), 0.0}, origin, 1.0F);
     for (int axis = 0; axis < 3; ++axis) {
       to.lower[axis][slot] = lower[axis];
-      to.upper[axis][slot] = upper[axis + 1];
+      to.upper[axis][slot] = upper[axis];
     }
   };
-  FaceBoxes all{std::vector<BoxesOf8>(leaves_.size()), std::vector<BoxesOf8>(nodes_.size())};
-  std::vector<FloatBox> whole(leaves_.size());
-  parallel_for(leaves_.size(), {.grain = leaves_a_share}, [&](std::size_t leaf) {
+  FaceBoxes all{UnsetVector<BoxesOf8>(leaves_.size()), UnsetVector<BoxesOf8>(nodes_.size()), {}};
+  UnsetVector<FloatBox> whole(leaves_.size());
+  const ParallelSettings shares{.grain = std::max<std::size_t>(1, grain / 8)};
+  std::vector<Farthest> farther(parallel_workers(leaves_.size(), shares));
+  parallel_for(leaves_.size(), shares, [&](std::size_t leaf, unsigned worker) {
+    const auto used = [&](std::size_t of) {
+      const std::uint32_t(&faces)[8] = leaves_[std::min(of, leaves_.size() - 1)].face;
+      return std::span(faces, static_cast<std::size_t>(std::find(faces, faces + 8, no_index) - faces));
+    };
+    const std::span<const std::uint32_t> faces = used(leaf);
+    Box boxes[8];
+    over(faces, used(leaf + 2), {boxes, faces.size()});
+    double most = 0.0;
     for (std::size_t i = 0; i < 8; ++i) {
-      const std::uint32_t face = leaves_[leaf].face[i];
-      if (face == no_index) {
+      if (i >= faces.size()) {
         all.leaves[leaf].set(i, FloatBox{});
-      } else {
-        set(all.leaves[leaf], i, boxes[face]);
+        continue;
       }
+      set(all.leaves[leaf], i, boxes[i]);
+      most = std::max(most, beyond(*mesh_, faces[i], boxes[i]));
     }
+    farther[worker].value = std::max(farther[worker].value, most);
     whole[leaf] = around(all.leaves[leaf]);
   });
+  UnsetVector<FloatBox> below(nodes_.size());
   for (std::size_t node = nodes_.size(); node-- > 0;) {
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint32_t child = nodes_[node].child[i];
       const bool empty = child == empty_child;
-      all.nodes[node].set(i, empty                     ? FloatBox{}
-                             : (child & leaf_bit) != 0 ? whole[child & ~leaf_bit]
-                                                       : around(all.nodes[child]));
+      all.nodes[node].set(i, empty ? FloatBox{} : (child & leaf_bit) != 0 ? whole[child & ~leaf_bit] : below[child]);
     }
+    below[node] = around(all.nodes[node]);
   }
+  all.farther = farthest_of(farther);
   return all;
 }
 
@@ -213,33 +246,33 @@ void Bvh::for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) co
                [&](std::size_t leaf) { join.run(static_cast<std::uint32_t>(leaf), visit); });
 }
 
-FaceBoxes TriangleIndex::enclosed(std::span<const Box> boxes) const {
+FaceBoxes TriangleIndex::enclosed(const BoxesOver& over, std::size_t grain) const {
+  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->enclosed(over, grain);
+  const std::size_t count = mesh().triangles().size();
+  const ParallelSettings shares{.grain = grain};
+  std::vector<Farthest> farther(parallel_workers(count, shares));
   FaceBoxes all;
-  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) all = bvh->enclosed(boxes);
-  const ParallelSettings shares{.grain = 8 * leaves_a_share};
-  std::vector<double> farther(parallel_workers(boxes.size(), shares), 0.0);
-  parallel_for(boxes.size(), shares, [&](std::size_t face, unsigned worker) {
-    Box own;
-    for (const Vec3& corner : mesh().corners(static_cast<std::uint32_t>(face))) own.include(corner);
-    farther[worker] = std::max(
-        {farther[worker], (own.lower - boxes[face].lower).maxCoeff(), (boxes[face].upper - own.upper).maxCoeff()});
+  all.faces = UnsetVector<Box>(count);
+  parallel_for(count, shares, [&](std::size_t i, unsigned worker) {
+    const auto face = static_cast<std::uint32_t>(i);
+    over({&face, 1}, {}, {&all.faces[i], 1});
+    farther[worker].value = std::max(farther[worker].value, beyond(mesh(), face, all.faces[i]));
   });
-  all.farther = *std::max_element(farther.begin(), farther.end());
+  all.farther = farthest_of(farther);
   return all;
 }
 
-void TriangleIndex::for_each_meeting(std::span<const Box> boxes, const FaceBoxes& enclosed,
-                                     const MeetingVisit& visit) const {
-  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(enclosed, visit);
+void TriangleIndex::for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const {
+  if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->for_each_meeting(boxes, visit);
   // The octree knows where the triangles are.
-  std::vector<std::uint32_t> last_met(boxes.size(), no_index);
-  for (std::uint32_t face = 0; face < boxes.size(); ++face) {
-    for_each_in_box(boxes[face].grown(enclosed.farther), [&](std::uint32_t other) {
+  std::vector<std::uint32_t> last_met(boxes.faces.size(), no_index);
+  for (std::uint32_t face = 0; face < boxes.faces.size(); ++face) {
+    for_each_in_box(boxes.faces[face].grown(boxes.farther), [&](std::uint32_t other) {
       // A face that stands in several cells counts once.
       if (other <= face || last_met[other] == face) return;
       last_met[other] = face;
       if (share_vertex(mesh().triangles()[face], mesh().triangles()[other])) return;
-      if (boxes[face].overlaps(boxes[other])) visit(face, other);
+      if (boxes.faces[face].overlaps(boxes.faces[other])) visit(face, {&other, 1});
     });
   }
 }

@@ -60,38 +60,77 @@ void Bvh::scan(const Vec3& p, double reach, Visit&& visit) const noexcept {
   }
 }
 
+inline FloatBox Bvh::local_box(const Box& box) const noexcept {
+  FloatBox local;
+  to_local(box.lower, local.lower);
+  to_local(box.upper, local.upper);
+  const float grow = rounding(local.lower) + rounding(local.upper);
+  for (int axis = 0; axis < 3; ++axis) {
+    local.lower[axis] -= grow;
+    local.upper[axis] += grow;
+  }
+  return local;
+}
+
 template <class Visit>
-void Bvh::for_each_in_box(const Box& box, Visit&& visit) const {
-  if (nodes_.empty() || box.empty()) return;
-  float lower[3];
-  float upper[3];
-  to_local(box.lower, lower);
-  to_local(box.upper, upper);
-  const float grow = rounding(lower) + rounding(upper);
-  const auto meets = [&](const BoxesOf8& boxes, unsigned i) {
-    bool overlap = true;
-    for (int axis = 0; axis < 3; ++axis) {
-      overlap = overlap && boxes.lower[axis][i] <= upper[axis] + grow && boxes.upper[axis][i] >= lower[axis] - grow;
-    }
-    return overlap;
-  };
+void Bvh::for_each_leaf(const FloatBox& box, Visit&& visit) const {
+  if (nodes_.empty()) return;
   std::uint32_t stack[stack_capacity];
   int top = 0;
   stack[top++] = 0;
   while (top > 0) {
     const Node& node = nodes_[stack[--top]];
-    for (unsigned i = 0; i < 8; ++i) {
-      const std::uint32_t child = node.child[i];
-      if (child == empty_child || !meets(node.boxes, i)) continue;
+    for (unsigned mask = kernels_->meeting(node.boxes, box); mask != 0; mask &= mask - 1) {
+      const std::uint32_t child = node.child[__builtin_ctz(mask)];
+      if (child == empty_child) continue;
       if ((child & leaf_bit) == 0) {
         stack[top++] = child;
-        continue;
-      }
-      for (const std::uint32_t face : leaves_[child & ~leaf_bit].face) {
-        if (face != no_index) visit(face);
+      } else {
+        visit(leaves_[child & ~leaf_bit]);
       }
     }
   }
+}
+
+template <class Visit>
+void Bvh::for_each_in_box(const Box& box, Visit&& visit) const {
+  if (box.empty()) return;
+  for_each_leaf(local_box(box), [&](const Leaf& leaf) {
+    for (const std::uint32_t face : leaf.face) {
+      if (face != no_index) visit(face);
+    }
+  });
+}
+
+inline PlanesAround Bvh::planes_around(const std::array<Vec3, 3>& corners, const Vec3& normal,
+                                       double margin) const noexcept {
+  PlanesAround planes;
+  const double local_margin = margin * per_scale_;
+  const auto set = [&](int k, const Vec3& outward, const Vec3& at) {
+    for (int axis = 0; axis < 3; ++axis) planes.normal[k][axis] = static_cast<float>(outward[axis]);
+    // The sum of its coordinates is no less than the normal's length.
+    const double size = outward.cwiseAbs().sum();
+    planes.limit[k] = static_cast<float>(outward.dot(at) + (local_margin + plane_rounding) * size);
+  };
+  Vec3 at[3];
+  for (std::size_t i = 0; i < 3; ++i) at[i] = (corners[i] - origin_) * per_scale_;
+  set(0, normal, at[0]);
+  set(1, -normal, at[0]);
+  for (std::size_t i = 0; i < 3; ++i) set(static_cast<int>(i) + 2, (at[(i + 1) % 3] - at[i]).cross(normal), at[i]);
+  return planes;
+}
+
+template <class Visit>
+void Bvh::for_each_beside(const std::array<Vec3, 3>& corners, const Vec3& normal, double margin, Visit&& visit) const {
+  Box box;
+  for (const Vec3& corner : corners) box.include(corner);
+  const PlanesAround planes = planes_around(corners, normal, margin);
+  for_each_leaf(local_box(box.grown(margin)), [&](const Leaf& leaf) {
+    for (unsigned mask = kernels_->within(leaf.triangles, planes); mask != 0; mask &= mask - 1) {
+      const std::uint32_t face = leaf.face[__builtin_ctz(mask)];
+      if (face != no_index) visit(face);
+    }
+  });
 }
 
 /// A segment as the kernels take it.

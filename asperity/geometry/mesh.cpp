@@ -422,9 +422,9 @@ Vec3 TriangleMesh::face_normal(std::uint32_t face) const noexcept {
   return (b - a).cross(c - a).normalized();
 }
 
-std::vector<FaceCorners> TriangleMesh::face_corners() const {
+UnsetVector<FaceCorners> TriangleMesh::face_corners() const {
   constexpr std::size_t share = 4096;
-  std::vector<FaceCorners> all(triangles_.size());
+  UnsetVector<FaceCorners> all(triangles_.size());
   parallel_for((all.size() + share - 1) / share, {}, [&](std::size_t i) {
     const std::size_t first = i * share;
     const std::size_t count = std::min(share, all.size() - first);

@@ -10,6 +10,7 @@
 
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
+#include "asperity/core/unset_vector.h"
 
 namespace asperity {
 
@@ -88,7 +89,7 @@ class TriangleMesh {
   /// Unit face normal, computed from the corners (right-hand rule). [servo]
   [[nodiscard]] Vec3 face_normal(std::uint32_t face) const noexcept;
   /// Normals of all triangles and angles at their corners (to 1e-12 of an angle), on all cores. [build]
-  [[nodiscard]] std::vector<FaceCorners> face_corners() const;
+  [[nodiscard]] UnsetVector<FaceCorners> face_corners() const;
   /// Unit vertex normal, weighted by the angles of the incident triangles. [servo]
   [[nodiscard]] Vec3 vertex_normal(std::uint32_t vertex) const noexcept {
     return vertex_normals_[vertex].cast<double>();

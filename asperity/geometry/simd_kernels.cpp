@@ -63,6 +63,33 @@ unsigned plain_ray(const BoxesOf8& boxes, const float origin[3], const float inv
   return mask;
 }
 
+unsigned plain_meeting(const BoxesOf8& boxes, const FloatBox& box) noexcept {
+  unsigned mask = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    bool meet = true;
+    for (int axis = 0; axis < 3; ++axis)
+      meet = meet && boxes.lower[axis][i] <= box.upper[axis] && boxes.upper[axis][i] >= box.lower[axis];
+    mask |= static_cast<unsigned>(meet) << i;
+  }
+  return mask;
+}
+
+unsigned plain_within(const TrianglesOf8& triangles, const PlanesAround& planes) noexcept {
+  unsigned mask = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    bool beyond = false;
+    for (int k = 0; k < PlanesAround::count; ++k) {
+      const auto along = [&](const float(&v)[3][8]) {
+        return v[0][i] * planes.normal[k][0] + v[1][i] * planes.normal[k][1] + v[2][i] * planes.normal[k][2];
+      };
+      const float least = along(triangles.corner) + std::min({0.0F, along(triangles.edge1), along(triangles.edge2)});
+      beyond = beyond || least > planes.limit[k];
+    }
+    mask |= static_cast<unsigned>(!beyond) << i;
+  }
+  return mask;
+}
+
 struct Candidate {
   float x, y, z, squared;
 };
@@ -152,6 +179,16 @@ ASPERITY_AVX2 unsigned avx2_ray(const BoxesOf8& boxes, const float origin[3], co
   return static_cast<unsigned>(_mm256_movemask_ps(met));
 }
 
+ASPERITY_AVX2 unsigned avx2_meeting(const BoxesOf8& boxes, const FloatBox& box) noexcept {
+  __m256 meet = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+  for (int axis = 0; axis < 3; ++axis) {
+    const __m256 below = _mm256_cmp_ps(_mm256_load_ps(boxes.lower[axis]), _mm256_set1_ps(box.upper[axis]), _CMP_LE_OQ);
+    const __m256 above = _mm256_cmp_ps(_mm256_load_ps(boxes.upper[axis]), _mm256_set1_ps(box.lower[axis]), _CMP_GE_OQ);
+    meet = _mm256_and_ps(meet, _mm256_and_ps(below, above));
+  }
+  return static_cast<unsigned>(_mm256_movemask_ps(meet));
+}
+
 struct Vector8 {
   __m256 x, y, z;
 };
@@ -195,6 +232,21 @@ ASPERITY_AVX2 unsigned avx2_cylinders(const CylindersOf8& cylinders, const float
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(squared, _mm256_set1_ps(bound * bound), _CMP_LE_OQ)));
 }
 
+ASPERITY_AVX2 unsigned avx2_within(const TrianglesOf8& triangles, const PlanesAround& planes) noexcept {
+  const Vector8 corner = load8(triangles.corner);
+  const Vector8 one = load8(triangles.edge1);
+  const Vector8 other = load8(triangles.edge2);
+  __m256 beyond = _mm256_setzero_ps();
+  for (int k = 0; k < PlanesAround::count; ++k) {
+    const float* n = planes.normal[k];
+    const Vector8 normal{_mm256_set1_ps(n[0]), _mm256_set1_ps(n[1]), _mm256_set1_ps(n[2])};
+    const __m256 least = _mm256_min_ps(_mm256_min_ps(dot8(one, normal), dot8(other, normal)), _mm256_setzero_ps());
+    const __m256 limit = _mm256_set1_ps(planes.limit[k]);
+    beyond = _mm256_or_ps(beyond, _mm256_cmp_ps(_mm256_add_ps(dot8(corner, normal), least), limit, _CMP_GT_OQ));
+  }
+  return ~static_cast<unsigned>(_mm256_movemask_ps(beyond)) & 0xFFU;
+}
+
 ASPERITY_AVX2 void avx2_triangles(const TrianglesOf8& triangles, const float point[3], DistancesOf8& out) noexcept {
   const Vector8 query{_mm256_set1_ps(point[0]), _mm256_set1_ps(point[1]), _mm256_set1_ps(point[2])};
   const Vector8 p = sub8(query, load8(triangles.corner));
@@ -233,13 +285,14 @@ ASPERITY_AVX2 void avx2_triangles(const TrianglesOf8& triangles, const float poi
 }  // namespace
 
 const SearchKernels& plain_kernels() noexcept {
-  static constexpr SearchKernels kernels{plain_boxes, plain_cylinders, plain_ray, plain_triangles};
+  static constexpr SearchKernels kernels{plain_boxes,   plain_cylinders, plain_ray,
+                                         plain_meeting, plain_within,    plain_triangles};
   return kernels;
 }
 
 const SearchKernels& best_kernels() noexcept {
 #if defined(__x86_64__)
-  static constexpr SearchKernels avx2{avx2_boxes, avx2_cylinders, avx2_ray, avx2_triangles};
+  static constexpr SearchKernels avx2{avx2_boxes, avx2_cylinders, avx2_ray, avx2_meeting, avx2_within, avx2_triangles};
   static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (supported) return avx2;
 #endif

@@ -1,5 +1,5 @@
 #pragma once
-// The two inner loops of every search: distances from a point to eight boxes, and to eight triangles.
+// The inner loops of every search: what of eight boxes, or of eight triangles, is near.
 // Each exists twice: plain C++, the oracle and the fallback, and AVX2, chosen once by what the processor has.
 // Results are single precision and only ever used to discard; what remains is decided in double precision.
 
@@ -59,6 +59,14 @@ struct alignas(32) TrianglesOf8 {
   float edge2[3][8];
 };
 
+/// What leaves out most of what does not come near a triangle: the planes a little above and below it, and a little
+/// beyond its edges. A point lies beyond one of them where normal . point > limit.
+struct PlanesAround {
+  static constexpr int count = 5;
+  float normal[count][3];  ///< of any length
+  float limit[count];
+};
+
 /// Vectors from the closest points of eight triangles to a point, and their lengths.
 struct alignas(32) DistancesOf8 {
   float offset[3][8];
@@ -75,6 +83,10 @@ struct SearchKernels {
   /// answers a bit mask of the boxes met.
   unsigned (*ray)(const BoxesOf8& boxes, const float origin[3], const float inverse_direction[3], float t_end,
                   float margin, float entry[8]) noexcept;
+  /// Bit mask of the boxes that meet `box`.
+  unsigned (*meeting)(const BoxesOf8& boxes, const FloatBox& box) noexcept;
+  /// Bit mask of the triangles that do not lie wholly beyond any one of the planes.
+  unsigned (*within)(const TrianglesOf8& triangles, const PlanesAround& planes) noexcept;
   /// Closest points of eight triangles to `point`.
   void (*triangles)(const TrianglesOf8& triangles, const float point[3], DistancesOf8& out) noexcept;
 };

@@ -61,10 +61,22 @@ class TriangleIndex {
   void for_each_in_box(const Box& box, Visit&& visit) const {
     std::visit([&](const auto& structure) { structure.for_each_in_box(box, visit); }, inside_->structure);
   }
-  /// Calls visit(one, other) once for every pair of triangles without a common vertex whose boxes meet (m; one for each
-  /// triangle, around it), and perhaps for some that miss each other by a rounding; in no order, and from several
-  /// threads at a time. `enclosed`: of the boxes. [build]
-  void for_each_meeting(std::span<const Box> boxes, const FaceBoxes& enclosed, const MeetingVisit& visit) const;
+  /// Calls visit(face) for every triangle that may come within `margin` (m) of a face, itself included: with a
+  /// hierarchy all but most of those that lie wholly above it, below it or beyond one of its edges by more. [servo]
+  template <class Visit>
+  void for_each_beside(std::uint32_t face, double margin, Visit&& visit) const {
+    const std::array<Vec3, 3> corners = mesh().corners(face);
+    if (const auto* bvh = std::get_if<Bvh>(&inside_->structure)) {
+      bvh->for_each_beside(corners, mesh().face_normal(face), margin, visit);
+      return;
+    }
+    Box box;
+    for (const Vec3& corner : corners) box.include(corner);
+    for_each_in_box(box.grown(margin), visit);
+  }
+  /// Calls visit(one, others) so that every pair of triangles without a common vertex whose boxes meet comes up once,
+  /// and perhaps some that miss each other by a rounding; in no order, and from several threads at a time. [build]
+  void for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) const;
   /// Calls visit(face), roughly from near to far, for every triangle whose bounding box grown by `radius` (m) the
   /// segment meets; visit answers the fraction of the segment beyond which nothing is wanted any more. [servo]
   template <class Visit>
@@ -81,8 +93,9 @@ class TriangleIndex {
     });
   }
 
-  /// Boxes, one a triangle and around it (m), to be searched instead of the triangles. [build]
-  [[nodiscard]] FaceBoxes enclosed(std::span<const Box> boxes) const;
+  /// Boxes, one a triangle and around it, to be searched instead of the triangles; never too small. Each thread takes
+  /// about `grain` triangles at a time. [build]
+  [[nodiscard]] FaceBoxes enclosed(const BoxesOver& over, std::size_t grain = 2048) const;
   /// for_each_along for the triangles whose boxes the segment meets, and perhaps some more. [servo]
   template <class Visit>
   void for_each_along(const Segment& segment, const FaceBoxes& boxes, Visit&& visit) const {

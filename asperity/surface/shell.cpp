@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "asperity/core/parallel_for.h"
+#include "asperity/surface/detail/four.h"
 
 namespace asperity {
 
@@ -21,22 +23,24 @@ struct WeightedNormal {
   double weight;
 };
 
+using NormalsAround = std::span<const WeightedNormal>;
+
 /// `corners`: of all faces. `around` is filled anew.
-void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, const std::vector<FaceCorners>& corners,
+void find_normals_around(const TriangleMesh& mesh, std::uint32_t vertex, std::span<const FaceCorners> corners,
                          std::vector<WeightedNormal>& around) {
   around.clear();
   for (const std::uint32_t face : mesh.faces_of_vertex(vertex))
     around.push_back({corners[face].normal, corners[face].angle[mesh.corner_of(face, vertex)]});
 }
 
-double least_normal_product(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+double least_normal_product(NormalsAround around, const Vec3& direction) {
   double least = infinity;
   for (const WeightedNormal& face : around) least = std::min(least, face.normal.dot(direction));
   return least;
 }
 
 /// Length that brings N . n to 1 in the mean of squares, for a given direction.
-Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
+Vec3 scaled(NormalsAround around, const Vec3& direction) {
   double once = 0.0;
   double twice = 0.0;
   for (const WeightedNormal& face : around) {
@@ -48,44 +52,148 @@ Vec3 scaled(const std::vector<WeightedNormal>& around, const Vec3& direction) {
   return std::clamp(length, 0.5, longest_direction) * direction;
 }
 
-/// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings).
-Vec3 least_squares(const std::vector<WeightedNormal>& around, const Vec3& normal) {
-  constexpr double hold = 1e-3;
-  // The matrix is symmetric: its upper half.
-  double xx = 0.0;
-  double xy = 0.0;
-  double xz = 0.0;
-  double yy = 0.0;
-  double yz = 0.0;
-  double zz = 0.0;
-  Vec3 right = Vec3::Zero();
-  double total = 0.0;
-  for (const WeightedNormal& face : around) {
-    const Vec3& n = face.normal;
-    const Vec3 weighted = face.weight * n;
-    xx += weighted.x() * n.x();
-    xy += weighted.x() * n.y();
-    xz += weighted.x() * n.z();
-    yy += weighted.y() * n.y();
-    yz += weighted.y() * n.z();
-    zz += weighted.z() * n.z();
-    right += weighted;
-    total += face.weight;
+/// The faces around four vertices, one of each at a time. A vertex with fewer of them than another has some of no
+/// weight.
+class FourFans {
+ public:
+  using Lanes = four::Lanes;
+  using Vectors = four::Vectors;
+
+  ASPERITY_FOUR FourFans(const TriangleMesh& mesh, const FaceCorners* corners, const std::uint32_t (&vertices)[4])
+      : mesh_(mesh), corners_(corners), vertices_(vertices) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      faces_[i] = mesh.faces_of_vertex(vertices[i]);
+      most_ = std::max(most_, faces_[i].size());
+    }
   }
-  if (total == 0.0) return normal;
+  ASPERITY_FOUR void vertex_normals(Vectors& normal) const {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vec3 own = mesh_.vertex_normal(vertices_[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) normal[axis][i] = own[static_cast<Eigen::Index>(axis)];
+    }
+  }
+  [[nodiscard]] ASPERITY_FOUR std::size_t size() const { return most_; }
+  ASPERITY_FOUR void at(std::size_t j, Vectors& normal, Lanes& weight) const {
+    static const FaceCorners nothing{Vec3::Zero(), {0.0, 0.0, 0.0}};
+    const FaceCorners* of[4];
+    for (std::size_t i = 0; i < 4; ++i) {
+      const bool is = j < faces_[i].size();
+      of[i] = is ? corners_ + faces_[i][j] : &nothing;
+      weight[i] = is ? of[i]->angle[mesh_.corner_of(faces_[i][j], vertices_[i])] : 0.0;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto x = static_cast<Eigen::Index>(axis);
+      normal[axis] = Lanes{of[0]->normal[x], of[1]->normal[x], of[2]->normal[x], of[3]->normal[x]};
+    }
+  }
+  ASPERITY_FOUR void least_product(const Vectors& direction, Lanes& least) const {
+    least = Lanes{} + infinity;
+    for (std::size_t j = 0; j < most_; ++j) {
+      Vectors normal;
+      Lanes weight;
+      at(j, normal, weight);
+      Lanes product;
+      four::dot(normal, direction, product);
+      for (std::size_t i = 0; i < 4; ++i) product[i] = j < faces_[i].size() ? product[i] : infinity;
+      four::keep_smaller(least, product);
+    }
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  const FaceCorners* corners_;
+  const std::uint32_t (&vertices_)[4];
+  std::span<const std::uint32_t> faces_[4];
+  std::size_t most_ = 0;
+};
+
+/// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings), for four
+/// vertices.
+ASPERITY_FOUR void solve_least_squares(const FourFans& fans, four::Vectors& direction) {
+  using four::Lanes;
+  using four::Vectors;
+  constexpr double hold = 1e-3;
+  Vectors normal;
+  fans.vertex_normals(normal);
+  // The matrix is symmetric: its upper half.
+  Lanes xx{}, xy{}, xz{}, yy{}, yz{}, zz{}, total{}, once{}, twice{};
+  Vectors right{};
+  for (std::size_t j = 0; j < fans.size(); ++j) {
+    Vectors n;
+    Lanes weight;
+    fans.at(j, n, weight);
+    const Vectors weighted = {weight * n[0], weight * n[1], weight * n[2]};
+    xx += weighted[0] * n[0];
+    xy += weighted[0] * n[1];
+    xz += weighted[0] * n[2];
+    yy += weighted[1] * n[1];
+    yz += weighted[1] * n[2];
+    zz += weighted[2] * n[2];
+    for (std::size_t axis = 0; axis < 3; ++axis) right[axis] += weighted[axis];
+    total += weight;
+    Lanes product;
+    four::dot(n, normal, product);
+    once += weight * product;
+    twice += weight * product * product;
+  }
+  // As `scaled` does it.
+  const Lanes zero{};
+  Lanes length = twice > 0.0 ? once / twice : zero + 1.0;
+  length = length < 0.5 ? zero + 0.5 : (length > longest_direction ? zero + longest_direction : length);
   xx += hold * total;
   yy += hold * total;
   zz += hold * total;
-  right += hold * total * scaled(around, normal);
-  const Vec3 first(yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
-  const Vec3 second(first.y(), xx * zz - xz * xz, xy * xz - xx * yz);
-  const Vec3 third(first.z(), second.z(), xx * yy - xy * xy);
-  const double det = xx * first.x() + xy * first.y() + xz * first.z();
-  return Vec3(first.dot(right), second.dot(right), third.dot(right)) / det;
+  for (std::size_t axis = 0; axis < 3; ++axis) right[axis] += hold * total * (length * normal[axis]);
+  const Vectors first = {yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy};
+  const Vectors second = {first[1], xx * zz - xz * xz, xy * xz - xx * yz};
+  const Vectors third = {first[2], second[2], xx * yy - xy * xy};
+  const Lanes det = xx * first[0] + xy * first[1] + xz * first[2];
+  four::dot(first, right, direction[0]);
+  four::dot(second, right, direction[1]);
+  four::dot(third, right, direction[2]);
+  for (std::size_t axis = 0; axis < 3; ++axis) direction[axis] = total == 0.0 ? normal[axis] : direction[axis] / det;
+}
+
+/// The four directions by least squares, and whether each is safe, a bit each.
+ASPERITY_FOUR unsigned least_squares_of_four(const TriangleMesh& mesh, const FaceCorners* corners,
+                                             const std::uint32_t (&vertices)[4], Vec3 (&directions)[4]) {
+  const FourFans fans(mesh, corners, vertices);
+  four::Vectors direction;
+  solve_least_squares(fans, direction);
+  four::Lanes least;
+  fans.least_product(direction, least);
+  four::Lanes size;
+  four::dot(direction, direction, size);
+  four::square_root(size, size);
+  unsigned safe = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    directions[i] = {direction[0][i], direction[1][i], direction[2][i]};
+    safe |= least[i] >= least_product && size[i] <= longest_direction ? 1U << i : 0U;
+  }
+  return safe;
+}
+
+using LeastSquaresOfFour = unsigned (*)(const TriangleMesh& mesh, const FaceCorners* corners,
+                                        const std::uint32_t (&vertices)[4], Vec3 (&directions)[4]);
+unsigned least_squares_plain(const TriangleMesh& mesh, const FaceCorners* corners, const std::uint32_t (&vertices)[4],
+                             Vec3 (&directions)[4]) {
+  return least_squares_of_four(mesh, corners, vertices, directions);
+}
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) unsigned least_squares_avx2(const TriangleMesh& mesh, const FaceCorners* corners,
+                                                            const std::uint32_t (&vertices)[4], Vec3 (&directions)[4]) {
+  return least_squares_of_four(mesh, corners, vertices, directions);
+}
+#endif
+LeastSquaresOfFour best_least_squares() noexcept {
+#if defined(__x86_64__)
+  if (four::has_avx2()) return least_squares_avx2;
+#endif
+  return least_squares_plain;
 }
 
 /// The direction whose least product with the normals around is largest, by pulling towards the worst one.
-Vec3 most_seen(const std::vector<WeightedNormal>& around, const Vec3& start) {
+Vec3 most_seen(NormalsAround around, const Vec3& start) {
   Vec3 best = start;
   double best_product = least_normal_product(around, start);
   Vec3 direction = start;
@@ -159,28 +267,37 @@ int cubic_roots(double a, double b, double c, double d, double roots[3]) noexcep
   return 3;
 }
 
-/// Moves each direction towards the mean of its neighbours' as far as every face around still sees it.
-void relax(const TriangleMesh& mesh, const std::vector<std::vector<WeightedNormal>>& around,
-           std::vector<Vec3>& directions) {
+/// Moves each direction towards the mean of its neighbours' as far as every face around still sees it. `corners`: of
+/// all faces.
+void relax(const TriangleMesh& mesh, std::span<const FaceCorners> corners, std::vector<Vec3>& directions) {
   constexpr int rounds = 30;
-  std::vector<Vec3> sum(directions.size());
-  std::vector<double> count(directions.size());
+  const ParallelSettings shares{.grain = 1024};
+  struct alignas(64) Scratch {
+    std::vector<WeightedNormal> around;
+  };
+  std::vector<Scratch> scratch(parallel_workers(directions.size(), shares));
+  std::vector<Vec3> next(directions.size());
   for (int round = 0; round < rounds; ++round) {
-    std::fill(sum.begin(), sum.end(), Vec3::Zero());
-    std::fill(count.begin(), count.end(), 0.0);
-    for (const TriangleMesh::Triangle& t : mesh.triangles()) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        sum[t[k]] += directions[t[(k + 1) % 3]] + directions[t[(k + 2) % 3]];
-        count[t[k]] += 2.0;
+    parallel_for(directions.size(), shares, [&](std::size_t i, unsigned worker) {
+      const auto vertex = static_cast<std::uint32_t>(i);
+      std::vector<WeightedNormal>& around = scratch[worker].around;
+      find_normals_around(mesh, vertex, corners, around);
+      next[i] = directions[i];
+      if (around.empty()) return;
+      Vec3 sum = Vec3::Zero();
+      double count = 0.0;
+      for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+        const TriangleMesh::Triangle& t = mesh.triangles()[face];
+        const std::size_t k = mesh.corner_of(face, vertex);
+        sum += directions[t[(k + 1) % 3]] + directions[t[(k + 2) % 3]];
+        count += 2.0;
       }
-    }
-    for (std::size_t i = 0; i < directions.size(); ++i) {
-      if (count[i] == 0.0) continue;
-      const Vec3 moved = scaled(around[i], (directions[i] + sum[i] / count[i]).normalized());
+      const Vec3 moved = scaled(around, (directions[i] + sum / count).normalized());
       // A height over each face may then differ from the metric one by a third at most.
-      if (least_normal_product(around[i], moved) > std::min(0.67, 0.9 * least_normal_product(around[i], directions[i])))
-        directions[i] = moved;
-    }
+      if (least_normal_product(around, moved) > std::min(0.67, 0.9 * least_normal_product(around, directions[i])))
+        next[i] = moved;
+    });
+    std::swap(directions, next);
   }
 }
 
@@ -287,35 +404,33 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   const bool relaxed = how == ShellDirections::relaxed;
   shell.directions.resize(count);
   std::vector<Vec3> directions(relaxed ? count : 0);
-  std::vector<std::vector<WeightedNormal>> around(relaxed ? count : 0);
-  const std::vector<FaceCorners> corners = mesh.face_corners();
-  const ParallelSettings shares{.grain = 1024};
-  struct Found {
+  const UnsetVector<FaceCorners> corners = mesh.face_corners();
+  const ParallelSettings shares{.grain = 256};
+  // Each thread's on cache lines of its own.
+  struct alignas(64) Found {
     std::vector<WeightedNormal> around;  ///< scratch
     std::vector<std::uint32_t> blind;
     std::uint32_t turned = 0;
   };
-  std::vector<Found> found(parallel_workers(count, shares));
-  parallel_for(count, shares, [&](std::size_t i, unsigned worker) {
-    const auto vertex = static_cast<std::uint32_t>(i);
+  std::vector<Found> found(parallel_workers((count + 3) / 4, shares));
+  const LeastSquaresOfFour least_squares = best_least_squares();
+  parallel_for((count + 3) / 4, shares, [&](std::size_t group, unsigned worker) {
     auto& [here, blind, turned] = found[worker];
-    find_normals_around(mesh, vertex, corners, here);
-    const Vec3 normal = mesh.vertex_normal(vertex);
-    Vec3 direction = normal;
-    if (!here.empty()) {
-      direction = least_squares(here, normal);
-      const bool safe = least_normal_product(here, direction) >= least_product && direction.norm() <= longest_direction;
-      if (!safe) {
-        const Vec3 seen = most_seen(here, normal);
-        direction = scaled(here, seen);
+    std::uint32_t vertices[4];
+    for (std::size_t i = 0; i < 4; ++i) vertices[i] = static_cast<std::uint32_t>(std::min(4 * group + i, count - 1));
+    Vec3 around[4];
+    const unsigned safe = least_squares(mesh, corners.data(), vertices, around);
+    for (std::size_t i = 0; i < std::min<std::size_t>(4, count - 4 * group); ++i) {
+      if ((safe >> i & 1U) == 0) {
+        find_normals_around(mesh, vertices[i], corners, here);
+        const Vec3 seen = most_seen(here, mesh.vertex_normal(vertices[i]));
+        around[i] = scaled(here, seen);
         ++turned;
-        if (least_normal_product(here, seen) <= 1e-3) blind.push_back(vertex);
+        if (least_normal_product(here, seen) <= 1e-3) blind.push_back(vertices[i]);
       }
+      shell.directions[vertices[i]] = around[i].cast<float>();
+      if (relaxed) directions[vertices[i]] = around[i];
     }
-    shell.directions[i] = direction.cast<float>();
-    if (!relaxed) return;
-    directions[i] = direction;
-    around[i] = here;
   });
   for (const Found& one : found) {
     shell.turned_vertices += one.turned;
@@ -323,7 +438,7 @@ Shell Shell::build(const TriangleMesh& mesh, ShellDirections how) {
   }
   std::sort(shell.blind_vertices.begin(), shell.blind_vertices.end());
   if (!relaxed) return shell;
-  relax(mesh, around, directions);
+  relax(mesh, corners, directions);
   for (std::size_t i = 0; i < count; ++i) shell.directions[i] = directions[i].cast<float>();
   return shell;
 }

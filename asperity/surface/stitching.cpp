@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/core/parallel_for.h"
+#include "asperity/core/unset_vector.h"
+
 namespace asperity {
 
 namespace {
@@ -32,23 +35,34 @@ constexpr int edge_opposite(int corner) {
   return (corner + 1) % 3;
 }
 
+// As many as make starting a thread pay.
+constexpr std::size_t stitched_a_share = 1024;
+
+/// Calls set(face) for each, or set(vertex), on all cores.
+template <class Set>
+void for_all(std::size_t count, const Set& set) {
+  parallel_for(count, {.grain = stitched_a_share}, [&](std::size_t i) { set(static_cast<std::uint32_t>(i)); });
+}
+
+using Widths = UnsetVector<std::array<double, 3>>;
+using Shapes = UnsetVector<FaceShape>;
+
 /// How far from each vertex (m) a face around it may still have a say. Around a vertex a band of width w meets the far
 /// side of a corner of angle a within w / sin(a / 2); folds turn angles a little, which the factor leaves room for.
-std::vector<double> reaches(const TriangleMesh& mesh, const std::vector<std::array<double, 3>>& widths,
-                            const std::vector<FaceShape>& shapes) {
+UnsetVector<double> reaches(const TriangleMesh& mesh, const Widths& widths, const Shapes& shapes) {
   constexpr double room = 1.5;
-  std::vector<double> widest(mesh.positions().size(), 0.0);
-  std::vector<double> sharpest(mesh.positions().size(), 1.0);
-  for (std::size_t face = 0; face < shapes.size(); ++face) {
-    const TriangleMesh::Triangle& t = mesh.triangles()[face];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double wide = std::max(widths[face][(k + 1) % 3], widths[face][(k + 2) % 3]);
-      widest[t[k]] = std::max(widest[t[k]], wide);
-      sharpest[t[k]] = std::min(sharpest[t[k]], std::sin(0.5 * std::min(shapes[face].angle[k], 1.57)));
+  UnsetVector<double> reach(mesh.positions().size());
+  for_all(reach.size(), [&](std::uint32_t vertex) {
+    double widest = 0.0;
+    double sharpest = 1.0;
+    for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+      const std::size_t k = mesh.corner_of(face, vertex);
+      widest = std::max({widest, widths[face][(k + 1) % 3], widths[face][(k + 2) % 3]});
+      sharpest = std::min(sharpest, std::sin(0.5 * std::min(shapes[face].angle[k], 1.57)));
     }
-  }
-  for (std::size_t i = 0; i < widest.size(); ++i) widest[i] = room * widest[i] / std::max(sharpest[i], 1e-6);
-  return widest;
+    reach[vertex] = room * widest / std::max(sharpest, 1e-6);
+  });
+  return reach;
 }
 
 /// How far into `face`, against how far into `other`, a place of `face` lies beyond their common edge when both are
@@ -123,12 +137,11 @@ BlendValue blend_value(const Stitching& stitching, double rho, double barycentri
 }
 
 std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shell, double rho) {
-  const auto faces = static_cast<std::uint32_t>(mesh.triangles().size());
-  std::vector<FaceShape> shapes;
-  shapes.reserve(faces);
-  for (std::uint32_t face = 0; face < faces; ++face) shapes.push_back(shape_of(mesh, face));
-  std::vector<std::array<double, 3>> widths(faces);
-  for (std::uint32_t face = 0; face < faces; ++face) {
+  const std::size_t faces = mesh.triangles().size();
+  Shapes shapes(faces);
+  for_all(faces, [&](std::uint32_t face) { shapes[face] = shape_of(mesh, face); });
+  Widths widths(faces);
+  for_all(faces, [&](std::uint32_t face) {
     for (int k = 0; k < 3; ++k) {
       double least = shapes[face].height[k];
       const std::uint32_t other = mesh.neighbour(face, edge_opposite(k));
@@ -137,25 +150,26 @@ std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shel
       }
       widths[face][static_cast<std::size_t>(k)] = rho * least;
     }
-  }
+  });
   // The say of the faces around a vertex must end well before the opposite edges.
   constexpr double most_of_height = 0.45;
-  std::vector<double> reach = reaches(mesh, widths, shapes);
-  std::vector<double> share(reach.size(), 1.0);
-  for (std::uint32_t face = 0; face < faces; ++face) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t vertex = mesh.triangles()[face][k];
-      if (reach[vertex] > 0.0)
-        share[vertex] = std::min(share[vertex], most_of_height * shapes[face].height[k] / reach[vertex]);
+  UnsetVector<double> reach = reaches(mesh, widths, shapes);
+  UnsetVector<double> share(reach.size());
+  for_all(share.size(), [&](std::uint32_t vertex) {
+    double least = 1.0;
+    for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+      const double height = shapes[face].height[mesh.corner_of(face, vertex)];
+      if (reach[vertex] > 0.0) least = std::min(least, most_of_height * height / reach[vertex]);
     }
-  }
-  for (std::uint32_t face = 0; face < faces; ++face) {
+    share[vertex] = least;
+  });
+  for_all(faces, [&](std::uint32_t face) {
     const TriangleMesh::Triangle& t = mesh.triangles()[face];
     for (std::size_t k = 0; k < 3; ++k) widths[face][k] *= std::min(share[t[(k + 1) % 3]], share[t[(k + 2) % 3]]);
-  }
+  });
   reach = reaches(mesh, widths, shapes);
   std::vector<StitchBand> bands(faces);
-  for (std::uint32_t face = 0; face < faces; ++face) {
+  for_all(faces, [&](std::uint32_t face) {
     for (std::size_t k = 0; k < 3; ++k) {
       bands[face].rho[k] = static_cast<float>(widths[face][k] / shapes[face].height[k]);
       const int corner = static_cast<int>(k);
@@ -167,7 +181,7 @@ std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shel
       bands[face].reach[k] =
           static_cast<float>(std::min(1.0, reach[mesh.triangles()[face][k]] / shapes[face].height[k]));
     }
-  }
+  });
   return bands;
 }
 

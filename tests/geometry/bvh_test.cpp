@@ -121,6 +121,49 @@ TEST(Bvh, BoxQueryFindsEveryTriangleWhoseBoxMeets) {
   }
 }
 
+TEST(TriangleIndex, WhatComesNearAFaceIsFoundBesideIt) {
+  std::size_t seen = 0;
+  std::size_t left_out = 0;
+  for (const TriangleMesh& mesh : meshes()) {
+    const double margin = 1e-6 * mesh.bounds().diagonal();
+    for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
+      const TriangleIndex index = TriangleIndex::build(mesh, structure);
+      for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+        std::vector<int> found(mesh.triangles().size(), 0);
+        index.for_each_beside(face, margin, [&](std::uint32_t other) { ++found[other]; });
+        const std::array<Vec3, 3> own = mesh.corners(face);
+        const Vec3 front = mesh.face_normal(face);
+        const auto beyond = [&](const std::array<Vec3, 3>& corners, const Vec3& at, const Vec3& outward) {
+          double least = infinity;
+          for (const Vec3& corner : corners) least = std::min(least, outward.dot(corner - at));
+          return least > margin;
+        };
+        Box around;
+        for (const Vec3& corner : own) around.include(corner);
+        around = around.grown(margin);
+        for (std::uint32_t other = 0; other < mesh.triangles().size(); ++other) {
+          const std::array<Vec3, 3> corners = mesh.corners(other);
+          bool apart = beyond(corners, own[0], front) || beyond(corners, own[0], -front);
+          for (std::size_t k = 0; k < 3; ++k)
+            apart = apart || beyond(corners, own[k], (own[(k + 1) % 3] - own[k]).cross(front).normalized());
+          Box box;
+          for (const Vec3& corner : corners) box.include(corner);
+          ASSERT_TRUE(found[other] > 0 || apart || !box.overlaps(around)) << "face " << other << " beside " << face;
+          // All that have a vertex in common are told of: they can be counted.
+          const bool around_it = share_vertex(mesh.triangles()[face], mesh.triangles()[other]);
+          ASSERT_TRUE(!around_it || found[other] > 0) << "face " << other << " at " << face;
+          if (structure == SearchStructure::octree) continue;
+          ASSERT_LE(found[other], 1);
+          seen += found[other] > 0 && !around_it ? 1U : 0U;
+          left_out += found[other] == 0 && box.overlaps(around) ? 1U : 0U;
+        }
+      }
+    }
+  }
+  EXPECT_GT(seen, 100u);
+  EXPECT_GT(2 * left_out, seen);
+}
+
 // The certificate: a coherent walk answers as brute force does at every step, for any length of step.
 TEST(TriangleIndex, CoherentClosestIsExactOnRandomWalks) {
   Rng rng(5);
@@ -265,6 +308,63 @@ TEST(SimdKernels, PlainAndBestAgree) {
       EXPECT_NEAR(plain_boxes[lane], best_boxes[lane], 2e-6F);
     }
   }
+}
+
+TEST(SimdKernels, PlainAndBestLeaveOutTheSame) {
+  Rng rng(17);
+  const auto any = [&](double least, double most) { return static_cast<float>(rng.uniform(least, most)); };
+  std::size_t met = 0;
+  std::size_t within = 0;
+  for (int i = 0; i < 2000; ++i) {
+    TrianglesOf8 triangles;
+    BoxesOf8 boxes;
+    FloatBox box;
+    PlanesAround planes;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = any(-1.0, 0.5);
+      box.upper[axis] = box.lower[axis] + any(0.0, 1.0);
+      for (int lane = 0; lane < 8; ++lane) {
+        triangles.corner[axis][lane] = any(-1.0, 1.0);
+        triangles.edge1[axis][lane] = any(-0.3, 0.3);
+        triangles.edge2[axis][lane] = any(-0.3, 0.3);
+        boxes.lower[axis][lane] = any(-1.0, 0.5);
+        boxes.upper[axis][lane] = lane == 5 ? -1e30F : boxes.lower[axis][lane] + any(0.0, 1.0);
+      }
+      // Boxes that touch meet.
+      if (i % 3 == 0) boxes.lower[axis][2] = box.upper[axis];
+    }
+    for (int k = 0; k < PlanesAround::count; ++k) {
+      for (float& n : planes.normal[k]) n = any(-1.0, 1.0);
+      planes.limit[k] = any(-0.5, 1.5);
+    }
+    const unsigned meeting = plain_kernels().meeting(boxes, box);
+    ASSERT_EQ(meeting, best_kernels().meeting(boxes, box));
+    for (unsigned lane = 0; lane < 8; ++lane) {
+      bool meet = true;
+      bool beyond = false;
+      bool near_limit = false;
+      for (int axis = 0; axis < 3; ++axis)
+        meet = meet && boxes.lower[axis][lane] <= box.upper[axis] && boxes.upper[axis][lane] >= box.lower[axis];
+      ASSERT_EQ(meet, (meeting >> lane & 1U) != 0);
+      for (int k = 0; k < PlanesAround::count; ++k) {
+        const auto along = [&](const auto& v) {
+          double sum = 0.0;
+          for (int axis = 0; axis < 3; ++axis)
+            sum += static_cast<double>(v[axis][lane]) * static_cast<double>(planes.normal[k][axis]);
+          return sum;
+        };
+        const double least = along(triangles.corner) + std::min({0.0, along(triangles.edge1), along(triangles.edge2)});
+        beyond = beyond || least > static_cast<double>(planes.limit[k]);
+        near_limit = near_limit || std::abs(least - static_cast<double>(planes.limit[k])) < 1e-6;
+      }
+      for (const SearchKernels* kernels : {&plain_kernels(), &best_kernels()})
+        ASSERT_TRUE(near_limit || beyond == ((kernels->within(triangles, planes) >> lane & 1U) == 0));
+      met += meet ? 1U : 0U;
+      within += beyond ? 0U : 1U;
+    }
+  }
+  EXPECT_GT(met, 500u);
+  EXPECT_GT(within, 500u);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <rapidcheck/gtest.h>
 #include <cmath>
+#include <span>
 
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
@@ -345,9 +346,14 @@ TEST(TriangleIndex, PairsWithoutACommonVertexWhoseBoxesMeetAreFoundOnceEach) {
       const TriangleIndex index = TriangleIndex::build(mesh, structure);
       std::vector<std::uint8_t> found(std::size_t{faces} * faces, 0);
       // Each pair has a place of its own, whichever thread tells of it.
-      index.for_each_meeting(boxes, index.enclosed(boxes), [&](std::uint32_t one, std::uint32_t other) {
-        ASSERT_NE(one, other);
-        ++found[std::size_t{std::min(one, other)} * faces + std::max(one, other)];
+      const FaceBoxes enclosed = index.enclosed([&](auto numbers, auto, auto out) {
+        for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = boxes[numbers[i]];
+      });
+      index.for_each_meeting(enclosed, [&](std::uint32_t one, std::span<const std::uint32_t> others) {
+        for (const std::uint32_t other : others) {
+          ASSERT_NE(one, other);
+          ++found[std::size_t{std::min(one, other)} * faces + std::max(one, other)];
+        }
       });
       for (std::uint32_t one = 0; one < faces; ++one) {
         for (std::uint32_t other = one + 1; other < faces; ++other) {

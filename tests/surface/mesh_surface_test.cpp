@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "asperity/surface/mesh/view.h"
 #include "tests/surface/coats.h"
 
 namespace asperity::mesh_surface_test {
@@ -108,6 +109,68 @@ TEST(MeshSurface, answers_the_same_with_and_without_a_cache) {
     ASSERT_EQ(a.value, b.value);
     // A foot on an edge may be told from either of its faces, which round it differently.
     ASSERT_LT((a.gradient - b.gradient).norm(), 1e-12);
+  }
+}
+
+/// A point that is led along a surface.
+struct Led {
+  std::shared_ptr<const MeshSurface> surface;
+  Place place;
+  FlatSpot spot;
+  explicit Led(std::shared_ptr<const MeshSurface> on) : surface(std::move(on)) {
+    SurfaceCache cache;
+    const Foot foot = surface->view(cache).nearest(surface->mesh().corners(0)[0], infinity);
+    place = {foot.element, false, foot.at};
+    spot = surface->view(cache).at(place);
+  }
+  DescentEnd to(const Vec3& goal, SurfaceCache& cache) {
+    return surface->view(cache).descend(place, spot, {.point = goal, .may_leave = false});
+  }
+};
+
+TEST(TriangleView, leads_a_point_the_same_with_and_without_a_cache) {
+  Rng rng(15);
+  const std::shared_ptr<const MeshSurface> surfaces[] = {
+      bare(icosphere(3, 0.02)), bare(random_closed_mesh(2, 3, 0.02, 0.4)), bare(plane_grid(0.04, 0.04, 12, 10))};
+  for (const auto& surface : surfaces) {
+    Led led(surface);
+    // The same triangles, larger: what the cache holds of one mesh is not read of another.
+    MeshSource source;
+    for (const Vec3& at : surface->mesh().positions()) source.positions.push_back(1.3 * at);
+    source.triangles.assign(surface->mesh().triangles().begin(), surface->mesh().triangles().end());
+    Led twin(bare(std::move(source)));
+    SurfaceCache kept;
+    Vec3 way = random_vector(rng, 1.0).normalized();
+    int crossed = 0;
+    int ready = 0;
+    for (int tick = 0; tick < 4000; ++tick) {
+      way = (way + random_vector(rng, 0.05)).normalized();
+      if (tick % 400 == 0) way = random_vector(rng, 1.0).normalized();
+      const Vec3 goal = led.spot.point + 1e-4 * way;
+      const std::uint32_t before = led.place.element;
+      const FlatAhead ahead = kept.ahead;
+      const Place start = led.place;
+      Led fresh = led;
+      SurfaceCache empty;
+      const DescentEnd end = led.to(goal, kept);
+      ASSERT_EQ(fresh.to(goal, empty), end);
+      ASSERT_EQ(fresh.place.element, led.place.element);
+      ASSERT_EQ(fresh.place.at, led.place.at);
+      ASSERT_EQ(fresh.spot.point, led.spot.point);
+      ASSERT_EQ(fresh.spot.front, led.spot.front);
+      if (led.place.element != before) {
+        ++crossed;
+        ready += ahead.from == before && ahead.frame.face == led.place.element ? 1 : 0;
+        EXPECT_TRUE(!ready || ahead.frame.asked || ahead.frame.face != led.place.element);
+      }
+      if (tick % 3 == 0) {
+        twin.place = start;
+        twin.spot = twin.surface->view(empty).at(start);
+        twin.to(1.3 * goal, kept);
+      }
+    }
+    EXPECT_GT(crossed, 60);
+    EXPECT_GT(ready, crossed / 2);
   }
 }
 

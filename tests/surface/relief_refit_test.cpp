@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <optional>
+#include <span>
 #include <thread>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/surface/relief/view.h"
 #include "tests/surface/reliefs.h"
 
@@ -178,6 +180,8 @@ TEST(ReliefRefit, OverlapsComeAndGo) {
 void expect_the_same(const ReliefSurface& one, const ReliefSurface& other) {
   EXPECT_EQ(one.shell().directions, other.shell().directions);
   EXPECT_EQ(one.reach(), other.reach());
+  EXPECT_EQ(one.least_fillet(), other.least_fillet());
+  EXPECT_EQ(one.boxes().farther, other.boxes().farther);
   EXPECT_EQ(one.skin(), other.skin());
   const ReliefReport& report = one.report();
   const ReliefReport& same = other.report();
@@ -194,10 +198,15 @@ void expect_the_same(const ReliefSurface& one, const ReliefSurface& other) {
     ASSERT_EQ(one.range(face).lowest, other.range(face).lowest);
     ASSERT_EQ(one.range(face).highest, other.range(face).highest);
     ASSERT_EQ(one.overlapped(face), other.overlapped(face));
+    for (std::size_t k = 0; k < 3; ++k) {
+      ASSERT_EQ(one.frame(face).band.rho[k], other.frame(face).band.rho[k]);
+      ASSERT_EQ(one.frame(face).band.look[k], other.frame(face).band.look[k]);
+      ASSERT_EQ(one.frame(face).band.reach[k], other.frame(face).band.reach[k]);
+    }
     const Vec3 at = test::random_barycentric(rng);
     ASSERT_EQ(one.point(one.frame(face), at[1], at[2]).point, other.point(other.frame(face), at[1], at[2]).point);
   }
-  const auto expect_boxes = [](const std::vector<BoxesOf8>& boxes, const std::vector<BoxesOf8>& equal) {
+  const auto expect_boxes = [](std::span<const BoxesOf8> boxes, std::span<const BoxesOf8> equal) {
     ASSERT_EQ(boxes.size(), equal.size());
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -286,6 +295,24 @@ TEST(ReliefRefit, ManyThreadsMayMoveOneRelief) {
   }
   for (std::thread& thread : threads) thread.join();
   for (const auto& one : moved) expect_the_same(*one, *moved[0]);
+}
+
+TEST(ReliefRefit, HoweverManyThreadsThereAreItIsTheSame) {
+  // Large enough to be shared out; where threads are shared out already, each loop within stays in one.
+  for (const FoldMode folds : {FoldMode::keep, FoldMode::round, FoldMode::fillet}) {
+    for (const ShellDirections directions : {ShellDirections::least_squares, ShellDirections::relaxed}) {
+      const Mapping mapping = folds == FoldMode::keep ? Mapping::triplanar : Mapping::per_face;
+      const auto laid = test::coated(icosphere(4, 0.05), test::wavy_map(0.2e-3), mapping, 0.01, 1.0, of(folds));
+      const ReliefSurface rest = must(ReliefSurface::build(laid->base(), laid->coat(), {.directions = directions}));
+      DeformableMesh deformable(rest.base());
+      const MeshSurface base = must(deformable.moved(moved_positions(rest.base().mesh(), waved)));
+      const ReliefSurface shared = must(rest.moved(base));
+      std::vector<std::optional<ReliefSurface>> alone(2);
+      parallel_for(2, {.threads = 2}, [&](std::size_t i) { alone[i] = must(rest.moved(base)); });
+      expect_the_same(*alone[0], shared);
+      EXPECT_EQ(shared.report().directions_relaxed, directions == ShellDirections::relaxed);
+    }
+  }
 }
 
 TEST(ReliefRefit, OlderSnapshotsGoOnAnswering) {

@@ -32,4 +32,11 @@ struct FlatFrame {
   }
 };
 
+/// The face across an edge that a walk was about to reach, ready before it gets there.
+struct FlatAhead {
+  std::uint32_t from = no_index;  ///< face that the edge is of
+  int edge = 0;                   ///< as TriangleMesh::neighbour counts them
+  FlatFrame frame;                ///< face == no_index: the edge is a rim
+};
+
 }  // namespace asperity

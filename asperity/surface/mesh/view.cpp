@@ -27,29 +27,76 @@ bool beyond(const std::array<Vec3, 3>& corners, const Vec3& point, const Vec3& o
   return least > margin;
 }
 
-/// Whether no triangle but those around comes near a face: each lies wholly beyond its plane, beyond one of its edges,
-/// or has the face wholly beyond its own plane.
+/// Whether a triangle lies wholly beyond a face's plane, beyond one of its edges, or has the face wholly beyond its own
+/// plane.
+bool apart(const TriangleMesh& mesh, const FlatFrame& frame, const std::array<Vec3, 3>& own, std::uint32_t face,
+           double margin) noexcept {
+  const std::array<Vec3, 3> other = mesh.corners(face);
+  if (beyond(other, own[0], frame.front, margin) || beyond(other, own[0], -frame.front, margin)) return true;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (beyond(other, own[k], (own[(k + 1) % 3] - own[k]).cross(frame.front).normalized(), margin)) return true;
+  }
+  const Vec3 front = mesh.face_normal(face);
+  return beyond(own, other[0], front, margin) || beyond(own, other[0], -front, margin);
+}
+
+/// Whether at least `count` triangles are known to have a vertex in common with a face, itself included.
+bool at_least_around(const TriangleMesh& mesh, std::uint32_t face, std::size_t count) noexcept {
+  // The face stands at three corners, and what is across its edges at two of them: one triangle an edge at most.
+  if (mesh.report().nonmanifold_edges != 0) return false;
+  std::size_t standing = 0;
+  for (const std::uint32_t vertex : mesh.triangles()[face]) standing += mesh.faces_of_vertex(vertex).size();
+  return count + 5 <= standing;
+}
+
+/// Whether no triangle but those around comes near a face.
 bool lonely(const MeshSurface& surface, const FlatFrame& frame) noexcept {
   const TriangleMesh& mesh = surface.mesh();
   const auto triangles = mesh.triangles();
   const std::array<Vec3, 3> own = mesh.corners(frame.face);
   const double margin = 4.0 * surface.skin();
-  Box box;
-  for (const Vec3& corner : own) box.include(corner);
+  FixedVector<std::uint32_t, 32> beside;
+  bool all = true;
+  surface.index().for_each_beside(frame.face, margin, [&](std::uint32_t face) { all = beside.push_back(face) && all; });
+  // All of those around are among them.
+  if (all && at_least_around(mesh, frame.face, beside.size())) return true;
   bool alone = true;
-  surface.index().for_each_in_box(box.grown(margin), [&](std::uint32_t face) {
+  const auto look_at = [&](std::uint32_t face) {
     if (!alone || share_vertex(triangles[face], triangles[frame.face])) return;
-    const std::array<Vec3, 3> other = mesh.corners(face);
-    bool apart = beyond(other, own[0], frame.front, margin) || beyond(other, own[0], -frame.front, margin);
-    for (std::size_t k = 0; k < 3 && !apart; ++k)
-      apart = beyond(other, own[k], (own[(k + 1) % 3] - own[k]).cross(frame.front).normalized(), margin);
-    if (!apart) {
-      const Vec3 front = mesh.face_normal(face);
-      apart = beyond(own, other[0], front, margin) || beyond(own, other[0], -front, margin);
-    }
-    alone = apart;
-  });
+    alone = apart(mesh, frame, own, face, margin);
+  };
+  if (all) {
+    for (const std::uint32_t face : beside) look_at(face);
+  } else {
+    surface.index().for_each_beside(frame.face, margin, look_at);
+  }
   return alone;
+}
+
+void ask_whether_lonely(const MeshSurface& surface, FlatFrame& frame) noexcept {
+  if (frame.asked) return;
+  frame.asked = true;
+  frame.lonely = lonely(surface, frame);
+}
+
+/// Makes ready what is across the edge that as much of a way again, and a half, would reach: the tick that gets there
+/// has enough to do. (du, dv): the way along the face in this tick.
+void look_ahead(const MeshSurface& surface, const FacePlace<FlatFrame>& at, double du, double dv,
+                FlatAhead& ahead) noexcept {
+  constexpr double ways = 1.5;
+  const double change[3] = {-du - dv, du, dv};
+  for (int k = 0; k < 3; ++k) {
+    if (!(change[k] < 0.0) || at.coordinate(k) + ways * change[k] > 0.0) continue;
+    const int edge = (k + 1) % 3;
+    if (ahead.from == at.frame.face && ahead.edge == edge && ahead.frame.owner == at.frame.owner) return;
+    const std::uint32_t face = surface.mesh().neighbour(at.frame.face, edge);
+    ahead = {at.frame.face, edge, {}};
+    ahead.frame.owner = at.frame.owner;
+    if (face == no_index) return;
+    ahead.frame = frame_of(surface, face);
+    ask_whether_lonely(surface, ahead.frame);
+    return;
+  }
 }
 
 /// The faces of a mesh.
@@ -60,10 +107,14 @@ struct FlatFaces {
   const TriangleView& view;
   double side;
   Sides sides;
+  const FlatFrame& ahead;
   bool& blocked;
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return view.surface().mesh(); }
-  [[nodiscard]] FlatFrame frame(std::uint32_t face) const noexcept { return frame_of(view.surface(), face); }
+  [[nodiscard]] FlatFrame frame(std::uint32_t face) const noexcept {
+    if (ahead.face == face && ahead.owner == view.surface().index().identity()) return ahead;
+    return frame_of(view.surface(), face);
+  }
   [[nodiscard]] static FlatSpot evaluate(const FlatFrame& frame, double u, double v) noexcept { return frame.at(u, v); }
   [[nodiscard]] static WalkForms forms(const FacePlace<FlatFrame>&, const FlatSpot& spot, const Vec3& goal) noexcept {
     const Vec3 rest = spot.point - goal;
@@ -85,10 +136,7 @@ struct FlatFaces {
 
   /// What is next to the face is met at the ends of the way, and walked onto there.
   [[nodiscard]] bool free(FlatFrame& frame, const FlatSpot& from, const FlatSpot& to) const noexcept {
-    if (!frame.asked) {
-      frame.asked = true;
-      frame.lonely = lonely(view.surface(), frame);
-    }
+    ask_whether_lonely(view.surface(), frame);
     if (frame.lonely) return true;
     const double skin = view.skin();
     const Vec3 off = skin * (side * frame.front);
@@ -119,7 +167,7 @@ const FlatFrame& TriangleView::frame(std::uint32_t face) const noexcept {
 
 DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal) const noexcept {
   bool blocked = false;
-  const FlatFaces faces{*this, place.side(), goal.sides, blocked};
+  const FlatFaces faces{*this, place.side(), goal.sides, cache_->ahead.frame, blocked};
   frame(place.element);
   FacePlace<FlatFrame>& at = cache_->flat;
   at.u = place.at[1];
@@ -128,6 +176,8 @@ DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal)
   Walk<FaceChart<FlatFaces>> walk(chart, goal, place.side());
   const DescentEnd end = walk.run();
   tell(cache_->work, {walk.moves(), 0, chart.frames()});
+  if (walk.moves() > 0 && at.frame.face == place.element)
+    look_ahead(*surface_, at, at.u - place.at[1], at.v - place.at[2], cache_->ahead);
   place.element = at.frame.face;
   place.at = {1.0 - at.u - at.v, at.u, at.v};
   return blocked ? DescentEnd::blocked : end;

@@ -1,9 +1,12 @@
 // Where the faces of a relief meet in folds: rounding, and what it does to the heights.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "asperity/core/fixed_vector.h"
+#include "asperity/core/parallel_for.h"
 #include "asperity/surface/relief/detail/halfspaces.h"
 #include "asperity/surface/relief/detail/partners.h"
 #include "asperity/surface/relief/surface.h"
@@ -36,6 +39,8 @@ double fold_sine(const TriangleMesh& mesh, std::uint32_t face, int edge, std::ui
   return -mesh.face_normal(face).cross(mesh.face_normal(other)).dot(along);
 }
 
+// As many as make starting a thread pay.
+constexpr std::size_t folds_a_share = 1024;
 // A fold flatter than this is none.
 constexpr double flat_fold = 1e-9;
 
@@ -47,39 +52,50 @@ void ReliefSurface::lay_fillets() {
   const Stitching& stitching = coat_.settings().stitching;
   if (stitching.folds != FoldMode::fillet || bands_.empty()) return;
   const TriangleMesh& mesh = base_.mesh();
-  fillets_.assign(mesh.positions().size(), static_cast<float>(stitching.fillet_radius));
-  fillet_reach_.assign(mesh.positions().size(), 1.0F);
-  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      float& reach = fillet_reach_[mesh.triangles()[face][k]];
-      reach = std::min(reach, bands_[face].reach[k]);
+  const std::size_t vertices = mesh.positions().size();
+  fillet_reach_.resize(vertices);
+  parallel_for(vertices, {.grain = folds_a_share}, [&](std::size_t i) {
+    const auto vertex = static_cast<std::uint32_t>(i);
+    float least = 1.0F;
+    for (const std::uint32_t face : mesh.faces_of_vertex(vertex))
+      least = std::min(least, bands_[face].reach[mesh.corner_of(face, vertex)]);
+    fillet_reach_[i] = least;
+  });
+  // Of the largest ball over each edge: the radius.
+  UnsetVector<std::array<float, 3>> fits(bands_.size());
+  parallel_for(fits.size(), {.grain = folds_a_share}, [&](std::size_t i) {
+    const auto face = static_cast<std::uint32_t>(i);
+    for (int edge = 0; edge < 3; ++edge) fits[i][static_cast<std::size_t>(edge)] = fillet_over(face, edge);
+  });
+  fillets_.resize(vertices);
+  parallel_for(vertices, {.grain = folds_a_share}, [&](std::size_t i) {
+    const auto vertex = static_cast<std::uint32_t>(i);
+    auto radius = static_cast<float>(stitching.fillet_radius);
+    for (const std::uint32_t face : mesh.faces_of_vertex(vertex)) {
+      const std::size_t k = mesh.corner_of(face, vertex);
+      radius = std::min({radius, fits[face][k], fits[face][(k + 2) % 3]});
     }
-  }
-  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
-    const auto corners = mesh.corners(face);
-    const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
-    for (int edge = 0; edge < 3; ++edge) {
-      const auto k = static_cast<std::size_t>(edge);
-      const std::uint32_t other = mesh.neighbour(face, edge);
-      if (other == no_index) continue;
-      const double sine = fold_sine(mesh, face, edge, other);
-      const double cosine = mesh.face_normal(face).dot(mesh.face_normal(other));
-      double fits = infinity;
-      if (sine < -flat_fold) {
-        fits = 0.0;
-      } else if (sine > flat_fold) {
-        // The fillet touches each face a tangent of half the fold away from the edge: within the inner half of the
-        // band, where the face across has its whole say.
-        const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
-        const double half_tangent = sine / std::max(1e-6, 1.0 + cosine);
-        fits = 0.45 * static_cast<double>(band_to(face, edge)) * height / half_tangent;
-      }
-      for (std::size_t end = 0; end < 2; ++end) {
-        float& radius = fillets_[mesh.triangles()[face][(k + end) % 3]];
-        radius = std::min(radius, static_cast<float>(fits));
-      }
-    }
-  }
+    fillets_[i] = radius;
+  });
+}
+
+float ReliefSurface::fillet_over(std::uint32_t face, int edge) const noexcept {
+  const TriangleMesh& mesh = base_.mesh();
+  const std::uint32_t other = mesh.neighbour(face, edge);
+  constexpr float any = std::numeric_limits<float>::infinity();
+  if (other == no_index) return any;
+  const double sine = fold_sine(mesh, face, edge, other);
+  if (sine < -flat_fold) return 0.0F;
+  if (!(sine > flat_fold)) return any;
+  // The fillet touches each face a tangent of half the fold away from the edge: within the inner half of the band,
+  // where the face across has its whole say.
+  const auto corners = mesh.corners(face);
+  const auto k = static_cast<std::size_t>(edge);
+  const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
+  const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
+  const double cosine = mesh.face_normal(face).dot(mesh.face_normal(other));
+  const double half_tangent = sine / std::max(1e-6, 1.0 + cosine);
+  return static_cast<float>(0.45 * static_cast<double>(band_to(face, edge)) * height / half_tangent);
 }
 
 float ReliefSurface::band_to(std::uint32_t face, int edge) const noexcept {
@@ -103,8 +119,14 @@ double ReliefSurface::deepest_fold() const {
     return coat_.settings().stitching.fillet_radius * (1.25 * longest - 1.0 + 0.05) +
            0.25 * (coat_.highest() - coat_.lowest());
   }
-  double depth = 0.0;
-  for (std::uint32_t face = 0; face < bands_.size(); ++face) {
+  const ParallelSettings shares{.grain = folds_a_share};
+  // Each thread's on a cache line of its own.
+  struct alignas(64) Depth {
+    double value = 0.0;
+  };
+  std::vector<Depth> deepest(parallel_workers(bands_.size(), shares));
+  parallel_for(bands_.size(), shares, [&](std::size_t i, unsigned worker) {
+    const auto face = static_cast<std::uint32_t>(i);
     const auto corners = mesh.corners(face);
     const double twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
     for (int edge = 0; edge < 3; ++edge) {
@@ -116,9 +138,12 @@ double ReliefSurface::deepest_fold() const {
       const double cosine = std::max(0.3, mesh.face_normal(face).dot(mesh.face_normal(other)));
       const double slope = std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
       const double height = twice_area / (corners[(k + 1) % 3] - corners[k]).norm();
-      depth = std::max(depth, 4.0 * static_cast<double>(bands_[face].rho[(k + 2) % 3]) * height * slope);
+      deepest[worker].value =
+          std::max(deepest[worker].value, 4.0 * static_cast<double>(bands_[face].rho[(k + 2) % 3]) * height * slope);
     }
-  }
+  });
+  double depth = 0.0;
+  for (const Depth& one : deepest) depth = std::max(depth, one.value);
   return depth;
 }
 

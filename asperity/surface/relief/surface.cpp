@@ -3,21 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "asperity/core/identity.h"
-#include "asperity/core/parallel_for.h"
-#include "asperity/surface/relief/detail/bounds.h"
 #include "asperity/surface/relief/detail/carried.h"
-#include "asperity/surface/relief/detail/slabs.h"
+#include "asperity/surface/relief/detail/enclosed.h"
 
 namespace asperity {
 
 namespace {
-
-// As many as make starting a thread pay where a face takes a tenth of a microsecond.
-constexpr std::size_t cheap_faces_a_share = 2048;
 
 Error overlap_error(const std::string& what) {
   return refused(ErrorCode::bad_mesh, what, "coat", "a lower relief, or on_overlap \"cure\"");
@@ -102,27 +96,6 @@ void ReliefSurface::lay_bands() {
   lay_fillets();
 }
 
-std::vector<double> ReliefSurface::fitting_shares() const {
-  const TriangleMesh& mesh = base_.mesh();
-  const Stitching& stitching = coat_.settings().stitching;
-  std::vector<double> share(mesh.triangles().size(), 1.0);
-  const double margin = !bands_.empty() && stitching.folds != FoldMode::keep ? 2.0 * stitching.rho : 0.0;
-  const double most = 2.0 * coat_.amplitude_bound() + 1e-12;
-  parallel_for(share.size(), {.grain = cheap_faces_a_share}, [&](std::size_t i) {
-    const auto face = static_cast<std::uint32_t>(i);
-    // Nearly every prism has room for all that the coat holds anywhere.
-    const ShellPrism prism = shell_.prism(mesh, face);
-    if (prism.holds(margin, coat_.amplitude_bound())) return;
-    const ShellInterval room = prism.injective(margin, most);
-    if (room.upper > room.lower && room.upper >= coat_.highest() && room.lower <= coat_.lowest()) return;
-    const HeightRange heights = range(frame(face), whole_triangle);
-    if (room.upper > 0.0 && heights.highest > room.upper) share[i] = room.upper / heights.highest;
-    if (room.lower < 0.0 && heights.lowest < room.lower) share[i] = std::min(share[i], room.lower / heights.lowest);
-    if (!(room.upper > room.lower)) share[i] = 0.0;
-  });
-  return share;
-}
-
 void ReliefSurface::fit(ShellDirections directions) {
   const TriangleMesh& mesh = base_.mesh();
   report_ = {};
@@ -133,12 +106,12 @@ void ReliefSurface::fit(ShellDirections directions) {
   lay_bands();
   report_.directions_relaxed = directions == ShellDirections::relaxed;
   report_.blind_vertices = shell_.blind_vertices;
-  std::vector<double> share = fitting_shares();
+  UnsetVector<double> share = fitting_shares();
   for (std::uint32_t face = 0; face < share.size(); ++face) {
     if (share[face] < 1.0) report_.faces_at_fault.push_back(face);
     report_.fitting_share = std::min(report_.fitting_share, share[face]);
   }
-  const auto missing = [](const std::vector<double>& shares) {
+  const auto missing = [](const UnsetVector<double>& shares) {
     double sum = 0.0;
     for (const double one : shares) sum += 1.0 - one;
     return sum;
@@ -147,7 +120,7 @@ void ReliefSurface::fit(ShellDirections directions) {
     Shell before = std::move(shell_);
     shell_ = Shell::build(mesh, ShellDirections::relaxed);
     lay_bands();
-    std::vector<double> relaxed = fitting_shares();
+    UnsetVector<double> relaxed = fitting_shares();
     report_.directions_relaxed = missing(relaxed) < 0.9 * missing(share);
     if (report_.directions_relaxed) {
       share = std::move(relaxed);
@@ -156,21 +129,16 @@ void ReliefSurface::fit(ShellDirections directions) {
       lay_bands();
     }
   }
-  if (missing(share) > 0.0) lower(share);
-  double longest = 0.0;
-  for (const Vec3f& direction : shell_.directions) longest = std::max(longest, static_cast<double>(direction.norm()));
+  if (!report_.faces_at_fault.empty() && missing(share) > 0.0) lower(share);
+  float longest = 0.0F;
+  for (const Vec3f& direction : shell_.directions) longest = std::max(longest, direction.squaredNorm());
   if (coat_.settings().stitching.folds != FoldMode::keep) fold_depth_ = deepest_fold();
   if (coat_.settings().stitching.folds == FoldMode::round)
     fold_depth_ = std::min(fold_depth_, coat_.settings().stitching.most_rounding);
-  reach_ = longest * (coat_.amplitude_bound() + fold_depth_);
+  reach_ = static_cast<double>(std::sqrt(longest)) * (coat_.amplitude_bound() + fold_depth_);
   grain_ = std::min(coat_.texel_size(), mesh.mean_edge());
   skin_ = std::min(base_.skin(), 1e-3 * grain_);
-  const std::size_t faces = mesh.triangles().size();
-  const auto room = std::make_unique_for_overwrite<RoundedSlab[]>(faces);
-  const std::span<RoundedSlab> slabs(room.get(), faces);
-  const std::vector<Box> boxes = enclose(slabs);
-  boxes_ = base_.index().enclosed(boxes);
-  find_overlaps(boxes, slabs);
+  find_overlaps(enclose());
 }
 
 bool ReliefSurface::any_height() const noexcept {
@@ -178,17 +146,7 @@ bool ReliefSurface::any_height() const noexcept {
   return coat_.moves() || (coat_.levels() > 0 && !coat_.layers().empty());
 }
 
-bool ReliefSurface::on_its_own(std::uint32_t face) const noexcept {
-  const TriangleMesh::Triangle& t = base_.mesh().triangles()[face];
-  const bool joins = coat_.settings().stitching.folds != FoldMode::keep;
-  for (const std::uint32_t vertex : t) {
-    if (!bands_.empty() && (joins || coat_.seam_at(vertex))) return false;
-    if (!shares_.empty() && shares_[vertex] != 1.0F) return false;
-  }
-  return true;
-}
-
-void ReliefSurface::lower(const std::vector<double>& share_of_face) {
+void ReliefSurface::lower(std::span<const double> share_of_face) {
   const TriangleMesh& mesh = base_.mesh();
   std::vector<float> share(mesh.positions().size(), 1.0F);
   for (std::size_t face = 0; face < share_of_face.size(); ++face) {
@@ -200,74 +158,6 @@ void ReliefSurface::lower(const std::vector<double>& share_of_face) {
     report_.least_share = std::min(report_.least_share, static_cast<double>(one));
   }
   shares_ = std::move(share);
-}
-
-std::vector<Box> ReliefSurface::enclose(std::span<RoundedSlab> slabs) {
-  const TriangleMesh& mesh = base_.mesh();
-  const std::size_t faces = mesh.triangles().size();
-  std::vector<Box> boxes(faces);
-  ranges_.assign(faces, {});
-  const FacePart whole = FacePart::triangle(whole_triangle[0], whole_triangle[1], whole_triangle[2]);
-  const bool anything = any_height();
-  const std::vector<CarriedHeight>& carried = carried_->heights;
-  // Rounded outwards by more than a float rounds.
-  const auto rounded = [](double value, double sign) {
-    return static_cast<float>(value + sign * 1e-6 * std::abs(value) + sign * 1e-30);
-  };
-  parallel_for(faces, {.grain = carried.empty() ? 256 : cheap_faces_a_share}, [&](std::size_t i) {
-    const auto face = static_cast<std::uint32_t>(i);
-    const ShellPrism prism = shell_.prism(mesh, face);
-    HeightRange all{infinity, -infinity};
-    Box box;
-    if (anything) {
-      all = {std::min(0.0, coat_.lowest()) - fold_depth_, std::max(0.0, coat_.highest()) + fold_depth_};
-      box = box_around({prism, all});
-    } else {
-      const bool known = !carried.empty() && on_its_own(face);
-      for (int level = 0; level <= coat_.levels(); ++level) {
-        CarriedHeight height;
-        if (known) {
-          height = carried[i * static_cast<std::size_t>(coat_.levels() + 1) + static_cast<std::size_t>(level)];
-        } else {
-          const ReliefFrame frame = this->frame(face, {static_cast<double>(level), 0.0});
-          height = {this->range(frame, whole_triangle), form(frame, whole)};
-        }
-        all = {std::min(all.lowest, height.range.lowest), std::max(all.highest, height.range.highest)};
-        // Two ways to enclose it: what both hold.
-        const Box slab = box_around({prism, height.range});
-        const ReliefBound bound = bound_over(prism, height.form, whole);
-        Box around;
-        for (const Vec3& corner : bound.corner) around.include(corner);
-        around = around.grown(bound.error);
-        around.lower = around.lower.cwiseMax(slab.lower);
-        around.upper = around.upper.cwiseMin(slab.upper);
-        box.include(around.lower);
-        box.include(around.upper);
-      }
-    }
-    boxes[i] = box;
-    ranges_[i] = {rounded(all.lowest, -1.0), rounded(all.highest, 1.0)};
-    slabs[i] = rounded_slab({prism, range(face)}, mesh.bounds().centre());
-  });
-  return boxes;
-}
-
-void ReliefSurface::find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs) {
-  const TriangleMesh& mesh = base_.mesh();
-  std::atomic<std::uint32_t> pairs{0};
-  overlapped_.assign(boxes.size(), 0);
-  const auto mark = [&](std::uint32_t face) {
-    std::atomic_ref<std::uint8_t>(overlapped_[face]).store(1, std::memory_order_relaxed);
-  };
-  base_.index().for_each_meeting(boxes, boxes_, [&](std::uint32_t face, std::uint32_t other) {
-    if (surely_apart(slabs[face], slabs[other]) || !boxes[face].overlaps(boxes[other])) return;
-    if (slabs_apart({shell_.prism(mesh, face), range(face)}, {shell_.prism(mesh, other), range(other)})) return;
-    pairs.fetch_add(1, std::memory_order_relaxed);
-    mark(face);
-    mark(other);
-  });
-  report_.overlapping_pairs = pairs;
-  if (pairs == 0) overlapped_ = {};
 }
 
 std::size_t ReliefSurface::memory_bytes() const noexcept {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "asperity/core/names.h"
+#include "asperity/core/unset_vector.h"
 #include "asperity/surface/coat.h"
 #include "asperity/surface/mesh/surface.h"
 #include "asperity/surface/relief/frame.h"
@@ -14,7 +15,6 @@
 namespace asperity {
 
 class ReliefView;
-struct RoundedSlab;
 
 /// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
 enum class OnOverlap {
@@ -178,6 +178,8 @@ class ReliefSurface {
 
  private:
   struct CarriedHeights;
+  struct Enclosed;
+  class EnclosedByFour;
   ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest, std::shared_ptr<CarriedHeights> carried);
   /// Finds what the moved reliefs have in common with this one.
   void carry() const;
@@ -186,17 +188,22 @@ class ReliefSurface {
   void fit(ShellDirections directions);
   void lay_bands();
   /// Per face: of the heights over it, the share that its prism has room for.
-  [[nodiscard]] std::vector<double> fitting_shares() const;
+  [[nodiscard]] UnsetVector<double> fitting_shares() const;
   [[nodiscard]] double deepest_fold() const;
   void lay_fillets();
+  /// Radius of the largest ball that fits over an edge (m): infinite where that is flat, 0 where it is convex.
+  [[nodiscard]] float fillet_over(std::uint32_t face, int edge) const noexcept;
   [[nodiscard]] float band_to(std::uint32_t face, int edge) const noexcept;
-  void lower(const std::vector<double>& share_of_face);
+  void lower(std::span<const double> share_of_face);
   /// Whether heights over a face may be anything that the coat holds, from level to level and moment to moment.
   [[nodiscard]] bool any_height() const noexcept;
   /// Whether neither other faces nor a cure have a say in a face's heights.
   [[nodiscard]] bool on_its_own(std::uint32_t face) const noexcept;
-  [[nodiscard]] std::vector<Box> enclose(std::span<RoundedSlab> slabs);
-  void find_overlaps(const std::vector<Box>& boxes, std::span<const RoundedSlab> slabs);
+  /// Finds ranges_ and boxes_, and what they are made of.
+  [[nodiscard]] Enclosed enclose();
+  /// Heights over all of a face at all levels, and the box around what they make of it.
+  [[nodiscard]] HeightRange enclose_face(std::uint32_t face, Box& box) const noexcept;
+  void find_overlaps(const Enclosed& enclosed);
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] double stitched_height(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
@@ -222,10 +229,10 @@ class ReliefSurface {
   std::vector<float> shares_;             ///< one a vertex, or empty: the whole height everywhere
   std::vector<std::uint8_t> overlapped_;  ///< one a face, or empty: whether reliefs of distant faces meet there
   struct FaceRange {
-    float lowest = 0.0F;
-    float highest = 0.0F;
+    float lowest;
+    float highest;
   };
-  std::vector<FaceRange> ranges_;  ///< one a face, rounded outwards
+  UnsetVector<FaceRange> ranges_;  ///< one a face, rounded outwards
   FaceBoxes boxes_;
   ReliefReport report_;
   double reach_ = 0.0;

@@ -61,42 +61,44 @@ inline bool slabs_apart(const Slab& one, const Slab& other) {
   return false;
 }
 
-// Four floats side by side: the three corners of a face, the last of them twice.
+// Four floats side by side: the three corners of a face, the last of them twice; or a vector and a place unused.
 using Corners = float __attribute__((vector_size(16)));
 
-/// A slab in single precision about a centre: for the direction that separates nearly all that boxes let through.
+/// A vertex in single precision: where it is from a centre, and the shell's direction there.
+struct RoundedVertex {
+  Corners place;
+  Corners direction;
+};
+
+/// A slab in single precision: for the direction that separates nearly all that boxes let through.
 struct RoundedSlab {
   Corners base[3];
   Corners direction[3];
   float lowest;
   float highest;
   float centre[3];
-  float size;  ///< more than the coordinates of anything in it
 };
 
-inline RoundedSlab rounded_slab(const Slab& slab, const Vec3& about) {
-  RoundedSlab rounded;
-  const ShellPrism& prism = slab.prism;
-  const Vec3 base = prism.corner - about;
-  const Vec3 centre = base + (prism.edge_u + prism.edge_v) / 3.0;
-  double size = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto all = [](double first, double by_u, double by_v) {
-      const auto second = static_cast<float>(first + by_u);
-      const auto third = static_cast<float>(first + by_v);
-      return Corners{static_cast<float>(first), second, third, third};
-    };
-    rounded.base[axis] = all(base[axis], prism.edge_u[axis], prism.edge_v[axis]);
-    rounded.direction[axis] = all(prism.direction[axis], prism.turn_u[axis], prism.turn_v[axis]);
-    rounded.centre[axis] = static_cast<float>(centre[axis]);
-    size += std::abs(base[axis]) + std::abs(prism.edge_u[axis]) + std::abs(prism.edge_v[axis]);
-    size += std::max(std::abs(slab.heights.lowest), std::abs(slab.heights.highest)) *
-            (std::abs(prism.direction[axis]) + std::abs(prism.turn_u[axis]) + std::abs(prism.turn_v[axis]));
-  }
-  rounded.lowest = static_cast<float>(slab.heights.lowest);
-  rounded.highest = static_cast<float>(slab.heights.highest);
-  rounded.size = static_cast<float>(size);
-  return rounded;
+inline RoundedSlab rounded_slab(const RoundedVertex* vertices, const TriangleMesh::Triangle& t, float lowest,
+                                float highest) {
+  RoundedSlab slab;
+  const auto turned = [](const Corners& a, const Corners& b, const Corners& c, Corners(&out)[3]) {
+    using Places = std::int32_t __attribute__((vector_size(16)));
+    const Corners xy = __builtin_shuffle(a, b, Places{0, 4, 1, 5});
+    out[0] = __builtin_shuffle(xy, c, Places{0, 1, 4, 4});
+    out[1] = __builtin_shuffle(xy, c, Places{2, 3, 5, 5});
+    out[2] = __builtin_shuffle(__builtin_shuffle(a, b, Places{2, 6, 2, 6}), c, Places{0, 1, 6, 6});
+  };
+  const RoundedVertex& a = vertices[t[0]];
+  const RoundedVertex& b = vertices[t[1]];
+  const RoundedVertex& c = vertices[t[2]];
+  turned(a.place, b.place, c.place, slab.base);
+  turned(a.direction, b.direction, c.direction, slab.direction);
+  const Corners centre = (a.place + b.place + c.place) / 3.0F;
+  for (int axis = 0; axis < 3; ++axis) slab.centre[axis] = centre[axis];
+  slab.lowest = lowest;
+  slab.highest = highest;
+  return slab;
 }
 
 /// How far a slab reaches along an axis at most.
@@ -109,15 +111,16 @@ inline float highest_along(const RoundedSlab& slab, const float (&axis)[3]) {
   return std::max({most[0], most[1], most[2]});
 }
 
-/// Whether a plane across the line from one to the other surely separates them.
-inline bool surely_apart(const RoundedSlab& one, const RoundedSlab& other) {
+/// Whether a plane across the line from one to the other surely separates them. `size`: more than the sum of the
+/// coordinates of anything in either.
+inline bool surely_apart(const RoundedSlab& one, const RoundedSlab& other, float size) {
   const float axis[3] = {other.centre[0] - one.centre[0], other.centre[1] - one.centre[1],
                          other.centre[2] - one.centre[2]};
   const float back[3] = {-axis[0], -axis[1], -axis[2]};
   // A sum of six products, of numbers that are rounded themselves.
-  constexpr float rounding = 2e-6F;
+  constexpr float rounding = 4e-6F;
   const float length = std::abs(axis[0]) + std::abs(axis[1]) + std::abs(axis[2]);
-  return highest_along(one, axis) + highest_along(other, back) + rounding * length * (one.size + other.size) < 0.0F;
+  return highest_along(one, axis) + highest_along(other, back) + rounding * length * size < 0.0F;
 }
 
 /// Around the hull of a slab.
