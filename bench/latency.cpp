@@ -209,6 +209,8 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "rays", "real"}));
     app.add_option("--data", options.real.data, "real, rays: folder of meshes, textures and volumes")
         ->capture_default_str();
+    app.add_option("--passes", options.real.passes, "real: times that each tick is timed, of which the least counts")
+        ->check(CLI::Range(1, 100));
     app.add_option("--ticks", options.real.ticks, "real: ticks a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();

@@ -20,7 +20,7 @@ struct RealRow {
   std::string body;
   std::string stroke;
   std::string law;
-  Latency times;                  ///< ns
+  Latency times;                  ///< ns, of each tick the least of all passes
   double worst_again = 0.0;       ///< ns: the slowest tick from its state, caches empty and cold, the least of 20 times
   double contact_share = 0.0;     ///< of the ticks
   std::uint32_t work_p999 = 0;    ///< evaluations, bounds and frames (WorkCount::sum)
@@ -36,6 +36,7 @@ struct RealRow {
 struct RealEffort {
   std::filesystem::path data;           ///< meshes/, textures/, volumes/
   std::size_t ticks = 20000;            ///< a row
+  int passes = 3;                       ///< that each tick is timed in, of which the least counts
   std::string only;                     ///< rows whose "body, stroke, law" holds this text; empty: all
   std::optional<std::uint32_t> budget;  ///< of each tick; 0: no limit
   bool every = false;  ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them

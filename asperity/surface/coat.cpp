@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <vector>
 
+#include "asperity/surface/detail/four.h"
 #include "asperity/surface/detail/triplanar.h"
 
 namespace asperity {
@@ -394,43 +396,73 @@ void Coat::heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes
   frame.maps->heights(s, t, frame.level, heights);
 }
 
+namespace {
+
+/// Where a triplanar coat looks for the heights of four places, by axis of the place: as coordinates along s, and along
+/// t; and the weights of what is seen along each axis.
+struct TriplanarLooks {
+  Lanes s[3];
+  Lanes t[3];
+  Lanes weight[3];
+};
+
+ASPERITY_FOUR void triplanar_looks(const CoatFrame& frame, const Vec2& tile, const Lanes& at_u, const Lanes& at_v,
+                                   TriplanarLooks& looks) {
+  using four::Wide;
+  Wide u;
+  Wide v;
+  std::memcpy(&u, at_u.data(), sizeof(u));
+  std::memcpy(&v, at_v.data(), sizeof(v));
+  Wide squared[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<int>(k);
+    const Wide place = frame.point[axis] + u * frame.point_u[axis] + v * frame.point_v[axis];
+    const Wide s = place / tile.x();
+    const Wide t = tile.x() == tile.y() ? s : place / tile.y();
+    std::memcpy(looks.s[k].data(), &s, sizeof(s));
+    std::memcpy(looks.t[k].data(), &t, sizeof(t));
+    const Wide normal = frame.normal[axis] + u * frame.normal_u[axis] + v * frame.normal_v[axis];
+    squared[k] = normal * normal;
+  }
+  const Wide least = triplanar_threshold * (squared[0] + squared[1] + squared[2]);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Wide above = squared[k] - least;
+    const Wide share = above > 0.0 ? above : Wide{};
+    const Wide weight = share * share;
+    std::memcpy(looks.weight[k].data(), &weight, sizeof(weight));
+  }
+}
+
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void triplanar_looks_by_avx2(const CoatFrame& frame, const Vec2& tile, const Lanes& u,
+                                                     const Lanes& v, TriplanarLooks& looks) noexcept {
+  triplanar_looks(frame, tile, u, v, looks);
+}
+#endif
+
+}  // namespace
+
 void Coat::triplanar_heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) noexcept {
-  const Vec2& tile = frame.maps->tile();
-  Lanes along_s[3];  // places as texture coordinates along s, and along t
-  Lanes along_t[3];
-  Lanes normal[3];
-  Lanes least;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (std::size_t i = 0; i < lanes; ++i) {
-      const double place = frame.point[axis] + u[i] * frame.point_u[axis] + v[i] * frame.point_v[axis];
-      along_s[axis][i] = place / tile.x();
-      along_t[axis][i] = place / tile.y();
-      normal[axis][i] = frame.normal[axis] + u[i] * frame.normal_u[axis] + v[i] * frame.normal_v[axis];
-    }
-  }
-  for (std::size_t i = 0; i < lanes; ++i) {
-    least[i] =
-        triplanar_threshold * (normal[0][i] * normal[0][i] + normal[1][i] * normal[1][i] + normal[2][i] * normal[2][i]);
-  }
+  TriplanarLooks looks;
+#if defined(__x86_64__)
+  if (four::has_avx2())
+    triplanar_looks_by_avx2(frame, frame.maps->tile(), u, v, looks);
+  else
+#endif
+    triplanar_looks(frame, frame.maps->tile(), u, v, looks);
   Lanes sum{};
-  Lanes weight{};
-  for (int axis = 0; axis < 3; ++axis) {
-    Lanes square;
-    double any = 0.0;
-    for (std::size_t i = 0; i < lanes; ++i) {
-      const double q = std::max(0.0, normal[axis][i] * normal[axis][i] - least[i]);
-      square[i] = q * q;
-      any = std::max(any, q);
-    }
-    if (any <= 0.0) continue;
+  Lanes total{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Lanes& weight = looks.weight[axis];
+    if (weight == Lanes{}) continue;
     Lanes height;
-    frame.maps->heights(along_s[(axis + 1) % 3], along_t[(axis + 2) % 3], frame.level, height);
+    frame.maps->heights(looks.s[(axis + 1) % 3], looks.t[(axis + 2) % 3], frame.level, height);
     for (std::size_t i = 0; i < lanes; ++i) {
-      sum[i] += square[i] * height[i];
-      weight[i] += square[i];
+      sum[i] += weight[i] * height[i];
+      total[i] += weight[i];
     }
   }
-  for (std::size_t i = 0; i < lanes; ++i) heights[i] = sum[i] / std::max(weight[i], std::numeric_limits<double>::min());
+  for (std::size_t i = 0; i < lanes; ++i) heights[i] = sum[i] / std::max(total[i], std::numeric_limits<double>::min());
 }
 
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {

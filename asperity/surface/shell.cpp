@@ -56,7 +56,7 @@ Vec3 scaled(NormalsAround around, const Vec3& direction) {
 /// weight.
 class FourFans {
  public:
-  using Lanes = four::Lanes;
+  using Wide = four::Wide;
   using Vectors = four::Vectors;
 
   ASPERITY_FOUR FourFans(const TriangleMesh& mesh, const FaceCorners* corners, const std::uint32_t (&vertices)[4])
@@ -73,7 +73,7 @@ class FourFans {
     }
   }
   [[nodiscard]] ASPERITY_FOUR std::size_t size() const { return most_; }
-  ASPERITY_FOUR void at(std::size_t j, Vectors& normal, Lanes& weight) const {
+  ASPERITY_FOUR void at(std::size_t j, Vectors& normal, Wide& weight) const {
     static const FaceCorners nothing{Vec3::Zero(), {0.0, 0.0, 0.0}};
     const FaceCorners* of[4];
     for (std::size_t i = 0; i < 4; ++i) {
@@ -83,16 +83,16 @@ class FourFans {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto x = static_cast<Eigen::Index>(axis);
-      normal[axis] = Lanes{of[0]->normal[x], of[1]->normal[x], of[2]->normal[x], of[3]->normal[x]};
+      normal[axis] = Wide{of[0]->normal[x], of[1]->normal[x], of[2]->normal[x], of[3]->normal[x]};
     }
   }
-  ASPERITY_FOUR void least_product(const Vectors& direction, Lanes& least) const {
-    least = Lanes{} + infinity;
+  ASPERITY_FOUR void least_product(const Vectors& direction, Wide& least) const {
+    least = Wide{} + infinity;
     for (std::size_t j = 0; j < most_; ++j) {
       Vectors normal;
-      Lanes weight;
+      Wide weight;
       at(j, normal, weight);
-      Lanes product;
+      Wide product;
       four::dot(normal, direction, product);
       for (std::size_t i = 0; i < 4; ++i) product[i] = j < faces_[i].size() ? product[i] : infinity;
       four::keep_smaller(least, product);
@@ -110,17 +110,17 @@ class FourFans {
 /// Least squares of N . n = 1, held to the vertex normal where the faces leave N free (flat surroundings), for four
 /// vertices.
 ASPERITY_FOUR void solve_least_squares(const FourFans& fans, four::Vectors& direction) {
-  using four::Lanes;
   using four::Vectors;
+  using four::Wide;
   constexpr double hold = 1e-3;
   Vectors normal;
   fans.vertex_normals(normal);
   // The matrix is symmetric: its upper half.
-  Lanes xx{}, xy{}, xz{}, yy{}, yz{}, zz{}, total{}, once{}, twice{};
+  Wide xx{}, xy{}, xz{}, yy{}, yz{}, zz{}, total{}, once{}, twice{};
   Vectors right{};
   for (std::size_t j = 0; j < fans.size(); ++j) {
     Vectors n;
-    Lanes weight;
+    Wide weight;
     fans.at(j, n, weight);
     const Vectors weighted = {weight * n[0], weight * n[1], weight * n[2]};
     xx += weighted[0] * n[0];
@@ -131,14 +131,14 @@ ASPERITY_FOUR void solve_least_squares(const FourFans& fans, four::Vectors& dire
     zz += weighted[2] * n[2];
     for (std::size_t axis = 0; axis < 3; ++axis) right[axis] += weighted[axis];
     total += weight;
-    Lanes product;
+    Wide product;
     four::dot(n, normal, product);
     once += weight * product;
     twice += weight * product * product;
   }
   // As `scaled` does it.
-  const Lanes zero{};
-  Lanes length = twice > 0.0 ? once / twice : zero + 1.0;
+  const Wide zero{};
+  Wide length = twice > 0.0 ? once / twice : zero + 1.0;
   length = length < 0.5 ? zero + 0.5 : (length > longest_direction ? zero + longest_direction : length);
   xx += hold * total;
   yy += hold * total;
@@ -147,7 +147,7 @@ ASPERITY_FOUR void solve_least_squares(const FourFans& fans, four::Vectors& dire
   const Vectors first = {yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy};
   const Vectors second = {first[1], xx * zz - xz * xz, xy * xz - xx * yz};
   const Vectors third = {first[2], second[2], xx * yy - xy * xy};
-  const Lanes det = xx * first[0] + xy * first[1] + xz * first[2];
+  const Wide det = xx * first[0] + xy * first[1] + xz * first[2];
   four::dot(first, right, direction[0]);
   four::dot(second, right, direction[1]);
   four::dot(third, right, direction[2]);
@@ -160,9 +160,9 @@ ASPERITY_FOUR unsigned least_squares_of_four(const TriangleMesh& mesh, const Fac
   const FourFans fans(mesh, corners, vertices);
   four::Vectors direction;
   solve_least_squares(fans, direction);
-  four::Lanes least;
+  four::Wide least;
   fans.least_product(direction, least);
-  four::Lanes size;
+  four::Wide size;
   four::dot(direction, direction, size);
   four::square_root(size, size);
   unsigned safe = 0;

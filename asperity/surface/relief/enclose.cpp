@@ -88,22 +88,22 @@ class ReliefSurface::EnclosedByFour {
     four::Prisms prisms;
     four::gather(mesh_, shell_, faces, prisms);
     four::Boxes all;
-    four::Lanes lowest = four::Lanes{} + infinity;
-    four::Lanes highest = four::Lanes{} - infinity;
+    four::Wide lowest = four::Wide{} + infinity;
+    four::Wide highest = four::Wide{} - infinity;
     for (std::size_t level = 0; level < levels_; ++level) {
       const CarriedHeight* height[4];
       for (std::size_t i = 0; i < 4; ++i) height[i] = heights_ + faces[i] * levels_ + level;
-      const four::Lanes low = {height[0]->range.lowest, height[1]->range.lowest, height[2]->range.lowest,
-                               height[3]->range.lowest};
-      const four::Lanes high = {height[0]->range.highest, height[1]->range.highest, height[2]->range.highest,
-                                height[3]->range.highest};
+      const four::Wide low = {height[0]->range.lowest, height[1]->range.lowest, height[2]->range.lowest,
+                              height[3]->range.lowest};
+      const four::Wide high = {height[0]->range.highest, height[1]->range.highest, height[2]->range.highest,
+                               height[3]->range.highest};
       four::Forms form;
       form.height =
-          four::Lanes{height[0]->form.height, height[1]->form.height, height[2]->form.height, height[3]->form.height};
-      form.u = four::Lanes{height[0]->form.u, height[1]->form.u, height[2]->form.u, height[3]->form.u};
-      form.v = four::Lanes{height[0]->form.v, height[1]->form.v, height[2]->form.v, height[3]->form.v};
+          four::Wide{height[0]->form.height, height[1]->form.height, height[2]->form.height, height[3]->form.height};
+      form.u = four::Wide{height[0]->form.u, height[1]->form.u, height[2]->form.u, height[3]->form.u};
+      form.v = four::Wide{height[0]->form.v, height[1]->form.v, height[2]->form.v, height[3]->form.v};
       form.error =
-          four::Lanes{height[0]->form.error, height[1]->form.error, height[2]->form.error, height[3]->form.error};
+          four::Wide{height[0]->form.error, height[1]->form.error, height[2]->form.error, height[3]->form.error};
       four::keep_smaller(lowest, low);
       four::keep_larger(highest, high);
       // Two ways to enclose it: what both hold.

@@ -26,12 +26,12 @@ ASPERITY_FOUR void gather(const TriangleMesh& mesh, const Shell& shell, const st
   const TriangleMesh::Triangle* const t[4] = {&mesh.triangles()[faces[0]], &mesh.triangles()[faces[1]],
                                               &mesh.triangles()[faces[2]], &mesh.triangles()[faces[3]]};
   for (int axis = 0; axis < 3; ++axis) {
-    const auto at = [&](std::size_t k, Lanes & place, Lanes & direction) __attribute__((always_inline)) {
-      place = Lanes{positions[(*t[0])[k]][axis], positions[(*t[1])[k]][axis], positions[(*t[2])[k]][axis],
-                    positions[(*t[3])[k]][axis]};
+    const auto at = [&](std::size_t k, Wide & place, Wide & direction) __attribute__((always_inline)) {
+      place = Wide{positions[(*t[0])[k]][axis], positions[(*t[1])[k]][axis], positions[(*t[2])[k]][axis],
+                   positions[(*t[3])[k]][axis]};
       direction = __builtin_convertvector((Floats{directions[(*t[0])[k]][axis], directions[(*t[1])[k]][axis],
                                                   directions[(*t[2])[k]][axis], directions[(*t[3])[k]][axis]}),
-                                          Lanes);
+                                          Wide);
     };
     const auto a = static_cast<std::size_t>(axis);
     at(0, out.corner[a], out.direction[a]);
@@ -55,7 +55,7 @@ ASPERITY_FOUR unsigned holds(const Prisms& prisms, double margin, double limit) 
   cross(prisms.turn_u, prisms.edge_v, turned);
   cross(prisms.turn_u, prisms.turn_v, c2);
   constexpr double share = 0.9;
-  auto all = Lanes{} == Lanes{};
+  auto all = Wide{} == Wide{};
   for (int k = 0; k < 3; ++k) {
     const double u = k == 1 ? 1.0 + 2.0 * margin : -margin;
     const double v = k == 2 ? 1.0 + 2.0 * margin : -margin;
@@ -64,9 +64,9 @@ ASPERITY_FOUR unsigned holds(const Prisms& prisms, double margin, double limit) 
       if (k == 0) c1[axis] += turned[axis];
       n[axis] = prisms.direction[axis] + u * prisms.turn_u[axis] + v * prisms.turn_v[axis];
     }
-    Lanes zeroth;
-    Lanes first;
-    Lanes second;
+    Wide zeroth;
+    Wide first;
+    Wide second;
     dot(n, c0, zeroth);
     dot(n, c1, first);
     dot(n, c2, second);
@@ -85,8 +85,8 @@ struct Boxes {
   Vectors upper;
 
   Boxes() {
-    lower.fill(Lanes{} + infinity);
-    upper.fill(Lanes{} - infinity);
+    lower.fill(Wide{} + infinity);
+    upper.fill(Wide{} - infinity);
   }
   ASPERITY_FOUR void include(const Vectors& point) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -97,13 +97,13 @@ struct Boxes {
 };
 
 /// box_around, four times. [build]
-ASPERITY_FOUR void box_around(const Prisms& prisms, const Lanes& lowest, const Lanes& highest, Boxes& box) {
+ASPERITY_FOUR void box_around(const Prisms& prisms, const Wide& lowest, const Wide& highest, Boxes& box) {
   for (int k = 0; k < 3; ++k) {
     Vectors low;
     Vectors high;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      Lanes base = prisms.corner[axis];
-      Lanes direction = prisms.direction[axis];
+      Wide base = prisms.corner[axis];
+      Wide direction = prisms.direction[axis];
       if (k == 1) base += prisms.edge_u[axis], direction += prisms.turn_u[axis];
       if (k == 2) base += prisms.edge_v[axis], direction += prisms.turn_v[axis];
       low[axis] = base + lowest * direction;
@@ -116,10 +116,10 @@ ASPERITY_FOUR void box_around(const Prisms& prisms, const Lanes& lowest, const L
 
 /// HeightForm, four times.
 struct Forms {
-  Lanes height;
-  Lanes u;
-  Lanes v;
-  Lanes error;
+  Wide height;
+  Wide u;
+  Wide v;
+  Wide error;
 };
 
 /// The box around what bound_over makes of all of a face, four times. [build]
@@ -136,8 +136,8 @@ ASPERITY_FOUR void box_around(const Prisms& prisms, const Forms& form, const Fac
     along_u[axis] = prisms.edge_u[axis] + form.u * direction[axis] + form.height * prisms.turn_u[axis];
     along_v[axis] = prisms.edge_v[axis] + form.v * direction[axis] + form.height * prisms.turn_v[axis];
   }
-  Lanes spread{};
-  Lanes turn{};
+  Wide spread{};
+  Wide turn{};
   for (int k = 0; k < 3; ++k) {
     const Vec2 off = whole.corner[static_cast<std::size_t>(k)] - whole.middle;
     Vectors corner;
@@ -147,20 +147,20 @@ ASPERITY_FOUR void box_around(const Prisms& prisms, const Forms& form, const Fac
       lean[axis] = off.x() * prisms.turn_u[axis] + off.y() * prisms.turn_v[axis];
     }
     box.include(corner);
-    Lanes across;
+    Wide across;
     magnitude(form.u * off.x() + form.v * off.y(), across);
     keep_larger(spread, across);
-    Lanes squared;
+    Wide squared;
     dot(lean, lean, squared);
     keep_larger(turn, squared);
   }
   square_root(turn, turn);
-  Lanes length;
+  Wide length;
   dot(direction, direction, length);
   square_root(length, length);
   Vectors size;
   for (std::size_t axis = 0; axis < 3; ++axis) magnitude(middle[axis], size[axis]);
-  const Lanes error = spread * turn + form.error * (length + turn) + 4e-16 * (size[0] + (size[1] + size[2]));
+  const Wide error = spread * turn + form.error * (length + turn) + 4e-16 * (size[0] + (size[1] + size[2]));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.lower[axis] -= error;
     box.upper[axis] += error;
