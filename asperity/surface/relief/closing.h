@@ -24,6 +24,7 @@ struct ClosingSettings {
   /// whichever is finer, from 8 to 48.
   int texels = 0;
   std::size_t most_memory = std::size_t{1} << 30;  ///< bytes that closing may use at one time, the answer included
+  unsigned threads = 0;                            ///< at most so many; 0: one a processor. The answer is the same
 };
 
 /// What closing did.
