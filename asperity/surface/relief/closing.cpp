@@ -29,7 +29,8 @@ Error closing_error(ErrorCode code, std::string what, std::string place, std::st
 int texels_for(const ReliefSurface& surface, const ClosingSettings& settings) {
   if (settings.texels > 0) return settings.texels;
   const double fine = std::min(surface.coat().texel_size(), settings.radius / 8.0);
-  return std::clamp(static_cast<int>(std::ceil(surface.base().mesh().mean_edge() / fine)), 8, 48);
+  // Eighths, so that coarse texels lie between the edges and leave most of the finer ones to bounds.
+  return std::clamp(8 * static_cast<int>(std::ceil(surface.base().mesh().mean_edge() / fine / 8.0)), 8, 48);
 }
 
 /// Of the samples (m): what is finer than the coat's texels is not there to be touched, and what a ball touches between
@@ -54,7 +55,8 @@ Status validate(const ReliefSurface& surface, const ClosingSettings& settings) {
   const auto cells = static_cast<double>(atlas_texels(mesh.triangles().size(), texels));
   const unsigned workers =
       parallel_workers(mesh.triangles().size(), {.grain = faces_a_share, .threads = settings.threads});
-  const double bytes = samples.bytes + workers * samples.bytes_a_thread + 2.0 * sizeof(float) * cells;
+  const double bytes =
+      samples.bytes + workers * samples.bytes_a_thread + (2.0 + surface.coat().levels()) * sizeof(float) * cells;
   if (bytes > static_cast<double>(settings.most_memory)) {
     return closing_error(ErrorCode::too_large,
                          fmt::format("needs {:.0f} MiB for {:.3g} places of the surface and {:.3g} texels",
@@ -111,31 +113,27 @@ double ClosedRelief::rise_at(std::uint32_t face, const Vec3& barycentric) const 
       rise[static_cast<std::size_t>(y) * static_cast<std::size_t>(atlas.width) + static_cast<std::size_t>(x)]);
 }
 
-Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSettings& settings,
-                                  const Progress& progress) {
-  if (auto valid = validate(surface, settings); !valid) return std::move(valid).error();
+namespace {
+
+/// One level of detail (0: the relief itself) closed into `closed`, whose atlas and rises are 0.
+void close_level(const ReliefSurface& surface, const CoatMoment& moment, const Progress& progress,
+                 ClosedRelief& closed) {
   const TriangleMesh& mesh = surface.base().mesh();
   const std::size_t count = mesh.triangles().size();
-  ClosedRelief closed;
-  closed.settings = settings;
-  closed.settings.texels = texels_for(surface, settings);
-  ASPERITY_TRY(closed.atlas, flat_atlas(mesh, closed.settings.texels));
-  closed.rise.assign(closed.atlas.heights.size(), 0.0F);
-  closed.report.tolerance = change_of_radius * settings.radius;
-  closed.report.texel_size = mesh.mean_edge() / closed.settings.texels;
-
+  const ClosingSettings& settings = closed.settings;
   ParallelSettings parallel{faces_a_share, settings.threads, &progress, "sampling the relief", 0.0, sampled};
-  const ReliefSamples samples(surface, {}, closed.settings.texels, sample_spacing(surface, settings.radius), parallel);
+  const ReliefSamples samples(surface, moment, settings.texels, sample_spacing(surface, settings.radius), parallel);
 
   parallel.what = "closing the relief";
   parallel.from = sampled;
   parallel.to = settled;
-  const unsigned workers = parallel_workers(count, parallel);
   std::vector<ClosedFace> faces(count);
-  std::vector<std::unique_ptr<FaceCloser>> closers(workers);
+  std::vector<std::unique_ptr<FaceCloser>> closers(parallel_workers(count, parallel));
   parallel_for(count, parallel, [&](std::size_t face, unsigned worker) {
-    if (closers[worker] == nullptr)
-      closers[worker] = std::make_unique<FaceCloser>(surface, samples, settings.radius, closed.report.tolerance);
+    if (closers[worker] == nullptr) {
+      closers[worker] =
+          std::make_unique<FaceCloser>(surface, samples, moment, settings.radius, closed.report.tolerance);
+    }
     faces[face] = closers[worker]->close(static_cast<std::uint32_t>(face), closed);
   });
   closers.clear();
@@ -144,23 +142,37 @@ Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSet
   parallel.what = "baking the closed relief";
   parallel.from = settled;
   parallel.to = 1.0;
-  const ClosedBorders borders(surface, samples, closed);
+  const ClosedBorders borders(surface, samples, moment, closed);
   parallel_for(count, parallel, [&](std::size_t face) { borders.fill(static_cast<std::uint32_t>(face), closed); });
-  if (progress) progress("closing the relief", 1.0);
-  return closed;
 }
 
-Result<std::shared_ptr<const ReliefSurface>> wear_closed(const ReliefSurface& original, const ClosedRelief& closed,
-                                                         const ReliefSettings& settings) {
-  ASPERITY_TRY(TriangleMesh mesh, with_atlas_uvs(original.base().mesh(), closed.atlas));
-  ReliefSettings same = settings;
-  same.directions = original.report().directions_relaxed ? ShellDirections::relaxed : ShellDirections::least_squares;
-  ASPERITY_TRY(std::shared_ptr<const ReliefSurface> surface, wear_atlas(mesh, closed.atlas, same));
-  if (surface->shell().directions != original.shell().directions) {
-    return closing_error(ErrorCode::bad_mesh, "the filled relief is higher than the shell over its faces holds",
-                         "radius", "a smaller radius, a lower relief, or a finer base mesh");
+}  // namespace
+
+Result<ClosedRelief> close_relief(const ReliefSurface& surface, const ClosingSettings& settings,
+                                  const Progress& progress) {
+  if (auto valid = validate(surface, settings); !valid) return std::move(valid).error();
+  const TriangleMesh& mesh = surface.base().mesh();
+  ClosedRelief closed;
+  closed.settings = settings;
+  closed.settings.texels = texels_for(surface, settings);
+  ASPERITY_TRY(closed.atlas, flat_atlas(mesh, closed.settings.texels));
+  closed.report.tolerance = change_of_radius * settings.radius;
+  closed.report.texel_size = mesh.mean_edge() / closed.settings.texels;
+  const std::size_t cells = closed.atlas.heights.size();
+  // The finest last: its rises and its report are the answer's.
+  for (int level = surface.coat().levels(); level >= 0; --level) {
+    closed.rise.assign(cells, 0.0F);
+    ClosingReport fresh;
+    fresh.tolerance = closed.report.tolerance;
+    fresh.texel_size = closed.report.texel_size;
+    closed.report = std::move(fresh);
+    close_level(surface, {static_cast<double>(level), 0.0}, progress, closed);
+    if (level == 0) break;
+    closed.levels.insert(closed.levels.begin(), std::move(closed.atlas.heights));
+    closed.atlas.heights.assign(cells, 0.0F);
   }
-  return surface;
+  if (progress) progress("closing the relief", 1.0);
+  return closed;
 }
 
 }  // namespace asperity

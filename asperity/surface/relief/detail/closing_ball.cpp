@@ -15,7 +15,7 @@ constexpr double touch_of_radius = 1e-4;
 constexpr double rest_of_radius = 3e-3;
 constexpr double still_of_radius = 1e-3;
 // A place is settled when its ball is free to this share of the radius.
-constexpr double settled_of_radius = 1e-3;
+constexpr double settled_of_radius = 2e-4;
 // Steps along a tangent are this many times as long as the distance says, at most; a ball that has no rest on a ridge
 // rolls off it by this share of the radius.
 constexpr double least_curvature = 0.04;
@@ -23,6 +23,8 @@ constexpr double roll_of_radius = 0.15;
 // A way along which the height falls by less than this share of the radius is not gone.
 constexpr double gain_of_radius = 2.5e-4;
 constexpr double most_move_of_radius = 0.5;
+// A ball that has come this far from what it is to hold has lost it.
+constexpr double most_away_of_radius = 6.0;
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 int nearest_inner(int at, int most) {
@@ -55,8 +57,9 @@ BallContact::BallContact(const ReliefSamples& samples, const ContactNode& node)
       a(node.i - patch.i),
       b(node.j - patch.j) {}
 
-BallSolver::BallSolver(const ReliefSurface& surface, const ReliefSamples& samples, double radius)
-    : surface_(surface), samples_(samples), radius_(radius), near_(samples, radius) {}
+BallSolver::BallSolver(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment,
+                       double radius)
+    : surface_(surface), samples_(samples), moment_(moment), radius_(radius), near_(samples, radius) {}
 
 bool BallSolver::is_free(const Vec3& centre, double share) {
   return !near_.any_within(centre, radius_ * (1.0 - share)).any();
@@ -328,7 +331,7 @@ void BallSolver::keep(const Vec3& centre, const NearestInHalfSpaces& rest, Resti
 }
 
 double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall& start, RestingBall& rest) {
-  constexpr int most_steps = 48;
+  constexpr int most_steps = 32;
   contacts_.clear();
   for (int k = 0; k < start.count; ++k) contacts_.push_back(BallContact(samples_, start.node[k]));
   Vec3 centre = start.centre;
@@ -340,6 +343,8 @@ double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall&
   for (int step = 0; step < most_steps; ++step) {
     for (BallContact& one : contacts_) follow(one, centre), prune();
     const Vec3 held = ray.at(height);
+    if ((centre - held).squaredNorm() > most_away_of_radius * most_away_of_radius * radius_ * radius_)
+      return not_a_number;
     Move move = move_from(centre, held);
     if (!move.known) return not_a_number;
     // Between walls that bend the ball may swing to and fro.
@@ -360,7 +365,7 @@ double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall&
     const bool still = !move.rolls && move.rest_of_way <= rest_of_radius * radius_ &&
                        std::abs(rise) * scale <= still_of_radius * radius_;
     const Found found = add_deepest(centre, still);
-    if (still && found != Found::added) {
+    if (still && found != Found::added && (found == Found::nothing || is_free(centre, settled_of_radius))) {
       keep(centre, move.rest, rest);
       return height;
     }
@@ -378,7 +383,9 @@ bool BallSolver::beyond_wall(const ShellRay& ray, double from, double to) const 
   const double scale = ray.direction.norm();
   if ((to - from) * scale <= 0.1 * radius_) return false;
   SurfaceCache cache;
-  return surface_.view(cache).first_touch({ray.at(from + 1e-3 * radius_ / scale), ray.at(to)}, Sides::both).hit;
+  return surface_.view(cache, moment_)
+      .first_touch({ray.at(from + 1e-3 * radius_ / scale), ray.at(to)}, Sides::both)
+      .hit;
 }
 
 double BallSolver::settle_from_above(const ShellRay& ray, double lowest, RestingBall& rest) {

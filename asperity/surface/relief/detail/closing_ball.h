@@ -81,7 +81,7 @@ struct RestingBall {
 /// went before.
 class BallSolver {
  public:
-  BallSolver(const ReliefSurface& surface, const ReliefSamples& samples, double radius);
+  BallSolver(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment, double radius);
 
   void start_anew() noexcept { near_.start_anew(); }
   /// Whether nothing is in a ball, to within `share` of the radius.
@@ -116,6 +116,7 @@ class BallSolver {
 
   const ReliefSurface& surface_;
   const ReliefSamples& samples_;
+  CoatMoment moment_;
   double radius_;
   NearSamples near_;
   BallContacts contacts_;

@@ -39,8 +39,13 @@ std::array<int, 2> nearest_within(int i, int j, double border, int texels) {
 
 }  // namespace
 
-ClosedBorders::ClosedBorders(const ReliefSurface& surface, const ReliefSamples& samples, const ClosedRelief& closed)
-    : surface_(surface), samples_(samples), texels_(closed.settings.texels), tolerance_(1e-5 * closed.settings.radius) {
+ClosedBorders::ClosedBorders(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment,
+                             const ClosedRelief& closed)
+    : surface_(surface),
+      samples_(samples),
+      moment_(moment),
+      texels_(closed.settings.texels),
+      tolerance_(1e-5 * closed.settings.radius) {
   const AtlasTile tile = atlas_tile(closed.atlas, 0);
   for (int j = -tile.border; j <= tile.most_sum + tile.border; ++j) {
     for (int i = -tile.border; i + j <= tile.most_sum; ++i) {
@@ -140,7 +145,7 @@ void ClosedBorders::fill(std::uint32_t face, ClosedRelief& closed) const {
   }
   std::array<bool, 3> convex{};
   for (std::size_t k = 0; k < 3; ++k) convex[k] = beyond_convex_edge(mesh, face, static_cast<int>(k));
-  const ReliefFrame frame = surface_.frame(face);
+  const ReliefFrame frame = surface_.frame(face, moment_);
   Beside last;
   for (const BesideTexel& texel : beside_) {
     const std::size_t at = tile.at(texel.i, texel.j);

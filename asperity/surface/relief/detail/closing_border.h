@@ -13,7 +13,8 @@ namespace asperity {
 /// Made when all faces are closed; faces may then be filled in any order.
 class ClosedBorders {
  public:
-  ClosedBorders(const ReliefSurface& surface, const ReliefSamples& samples, const ClosedRelief& closed);
+  ClosedBorders(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment,
+                const ClosedRelief& closed);
   /// Heights over and beside a face, and the rises beside it.
   void fill(std::uint32_t face, ClosedRelief& closed) const;
 
@@ -38,6 +39,7 @@ class ClosedBorders {
 
   const ReliefSurface& surface_;
   const ReliefSamples& samples_;
+  CoatMoment moment_;
   int texels_;
   double tolerance_;
   /// Texels that hold the surface as it goes on.

@@ -24,8 +24,13 @@ constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-FaceCloser::FaceCloser(const ReliefSurface& surface, const ReliefSamples& samples, double radius, double tolerance)
-    : surface_(surface), samples_(samples), radius_(radius), tolerance_(tolerance), solver_(surface, samples, radius) {}
+FaceCloser::FaceCloser(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment,
+                       double radius, double tolerance)
+    : surface_(surface),
+      samples_(samples),
+      radius_(radius),
+      tolerance_(tolerance),
+      solver_(surface, samples, moment, radius) {}
 
 std::uint32_t FaceCloser::add(const RestingBall& ball) {
   balls_.push_back(ball);
@@ -194,6 +199,34 @@ void FaceCloser::close_texels(int stride, bool coarsest) {
   }
 }
 
+void FaceCloser::relax(bool forward) {
+  // Ends of the lines of the grid through a texel that were visited before it.
+  constexpr std::array<std::array<int, 2>, 3> visited = {{{-1, 0}, {0, -1}, {-1, 1}}};
+  const int sign = forward ? 1 : -1;
+  for (int a = 0; a <= texels_; ++a) {
+    const int i = forward ? a : texels_ - a;
+    for (int b = 0; b <= texels_ - i; ++b) {
+      const int j = forward ? b : texels_ - i - b;
+      Known& here = known(i, j);
+      if (!std::isfinite(here.lower)) continue;
+      const Texel texel = texel_at(i, j);
+      if (here.upper <= texel.lowest) continue;
+      for (const auto& [di, dj] : visited) {
+        const int x = i + sign * di;
+        const int y = j + sign * dj;
+        if (x < 0 || y < 0 || x + y > texels_) continue;
+        const std::uint32_t ball = known(x, y).ball;
+        if (ball == no_index || ball == here.ball) continue;
+        const double height = entered(balls_[ball], texel);
+        if (!(height < here.upper)) continue;
+        here.upper = std::max(height, texel.lowest);
+        here.lower = std::min(here.lower, here.upper);
+        here.ball = ball;
+      }
+    }
+  }
+}
+
 ClosedFace FaceCloser::write(ClosedRelief& closed, const AtlasTile& tile) {
   ClosedFace report;
   for (int i = 0; i <= texels_; ++i) {
@@ -230,6 +263,8 @@ ClosedFace FaceCloser::close(std::uint32_t face, ClosedRelief& closed) {
     stride /= 2;
     close_texels(stride, false);
   }
+  relax(true);
+  relax(false);
   const ClosedFace report = write(closed, tile);
   if (!unsettled_.empty()) mend(closed, tile);
   return report;

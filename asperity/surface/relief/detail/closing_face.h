@@ -21,7 +21,8 @@ struct ClosedFace {
 /// One thread's own; what it answers of a face does not depend on the faces before.
 class FaceCloser {
  public:
-  FaceCloser(const ReliefSurface& surface, const ReliefSamples& samples, double radius, double tolerance);
+  FaceCloser(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment, double radius,
+             double tolerance);
   /// Finds by how much every texel over the face rises, into `closed.rise`.
   ClosedFace close(std::uint32_t face, ClosedRelief& closed);
 
@@ -62,6 +63,8 @@ class FaceCloser {
     return known.lower <= lowest && known.upper - lowest <= 0.8 * tolerance_ ? lowest
                                                                              : 0.5 * (known.lower + known.upper);
   }
+  /// Offers each texel the balls of its neighbours, which are free too: a rest that was found need not be the lowest.
+  void relax(bool forward);
   ClosedFace write(ClosedRelief& closed, const AtlasTile& tile);
   void mend(ClosedRelief& closed, const AtlasTile& tile) const;
 

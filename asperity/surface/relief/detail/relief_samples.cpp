@@ -7,8 +7,8 @@ namespace asperity {
 
 namespace {
 
-constexpr int most_cuts = 60000;
-constexpr int least_cuts = 4;
+constexpr int most_face_cuts = 60000;
+constexpr int least_face_cuts = 4;
 constexpr std::size_t chunk_bytes_held = std::size_t{24} << 20U;
 
 double longest_edge(const TriangleMesh& mesh, std::uint32_t face) {
@@ -18,10 +18,10 @@ double longest_edge(const TriangleMesh& mesh, std::uint32_t face) {
 
 /// Steps along each edge of a face: a multiple of the texels, fine enough for `spacing`.
 int cuts_for(const TriangleMesh& mesh, std::uint32_t face, int texels, double spacing) {
-  const double wanted = std::min(longest_edge(mesh, face) / spacing, static_cast<double>(most_cuts));
+  const double wanted = std::min(longest_edge(mesh, face) / spacing, static_cast<double>(most_face_cuts));
   // A little coarser than asked for is no reason for twice as many.
   int times = std::max(1, static_cast<int>(std::ceil(wanted / texels / 1.25)));
-  while (times * texels < least_cuts) ++times;
+  while (times * texels < least_face_cuts) ++times;
   return times * texels;
 }
 

@@ -43,7 +43,7 @@ class ReliefSamples {
     float top = 0.0F;  ///< m, of the plane over `centre`
   };
 
-  /// `spacing`: of the nodes at most (m), as far as `most_cuts` allow. Cuts are multiples of `texels`. [build]
+  /// `spacing`: of the nodes at most (m), as far as a grid allows. Cuts are multiples of `texels`. [build]
   ReliefSamples(const ReliefSurface& surface, const CoatMoment& moment, int texels, double spacing,
                 const ParallelSettings& parallel);
 
