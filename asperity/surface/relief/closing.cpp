@@ -17,7 +17,7 @@ namespace {
 constexpr double change_of_radius = 1e-3;
 constexpr int most_texels = 512;
 // Shares of a thread: neighbours have most of what they look at in common.
-constexpr std::size_t faces_a_share = 32;
+constexpr std::size_t faces_a_share = 8;
 // Of the work, by time: sampling, closing, the atlas.
 constexpr double sampled = 0.25;
 constexpr double settled = 0.85;
