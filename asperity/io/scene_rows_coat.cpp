@@ -71,7 +71,7 @@ void coat(SceneObject& row) {
   row("closing", Type::object("closing"),
       "Closes the relief with a ball, once, when the scene is read: folds, grooves and holes that it does not fit into "
       "are filled as far as it stays out (hrm-2010, 4.2).",
-      by_contents("a coat that has more than heights"));
+      by_contents("a coat with a layer that changes with time, or with maps of the material"));
   for (Option& one : row.rows) {
     const bool stays = one.key == "from" || one.key == "stitching" || one.key == "closing";
     if (!stays && (one.only.empty() || one.only.back().why != beside)) one.only_if(own, beside);

@@ -66,14 +66,13 @@ Result<SceneJson> close(Instance& instance, const SceneJson& json, const std::st
   const auto before = *std::get_if<std::shared_ptr<const ReliefSurface>>(&instance.surface);
   const ReliefSurface& relief = *before;
   const Coat& worn = relief.coat();
-  const char* lost = worn.moves()                   ? "a layer that changes with time"
-                     : worn.materials() != nullptr  ? "maps of the material"
-                     : worn.levels() > 0            ? "levels of detail"
-                     : worn.maps().has_normal_map() ? "a normal map"
-                                                    : nullptr;
+  const char* lost = worn.moves() ? "a layer that changes with time, which would have to be closed anew "
+                                    "at every moment"
+                     : worn.materials() != nullptr ? "maps of the material, laid by coordinates that it gives up"
+                                                   : nullptr;
   if (lost != nullptr) {
-    return refused(ErrorCode::mismatch, fmt::format("is baked into the heights alone, and the coat has {}", lost),
-                   place, "a coat of heights, or no closing");
+    return refused(ErrorCode::mismatch, fmt::format("is baked into heights and normals, and the coat has {}", lost),
+                   place, "a coat that is still and of one material, or no closing");
   }
   ASPERITY_TRY(ClosedRelief baked, at_place(close_relief(relief, settings, context.progress), place));
   ASPERITY_TRY(instance.surface, at_place(wear_closed(relief, baked), place));

@@ -292,5 +292,195 @@ TEST(Closing, refuses_what_it_cannot_do) {
   EXPECT_EQ(worn.error().code, ErrorCode::mismatch);
 }
 
+TEST(Closing, is_the_same_to_the_bit_on_any_number_of_threads) {
+  const auto open = coated(icosphere(2, 0.02), wavy_map(0.3e-3, 16), Mapping::triplanar, 3e-3);
+  ClosingSettings settings{2e-3, 16};
+  settings.threads = 1;
+  const ClosedRelief alone = must(close_relief(*open, settings));
+  settings.threads = 3;
+  const ClosedRelief together = must(close_relief(*open, settings));
+  EXPECT_GT(alone.report.changed_texels, 1000U);
+  EXPECT_EQ(alone.atlas.heights, together.atlas.heights);
+  EXPECT_EQ(alone.rise, together.rise);
+  EXPECT_EQ(alone.report.changed_faces, together.report.changed_faces);
+}
+
+/// Points of a relief, `cuts` along each edge of its faces.
+std::vector<Vec3> points_of(const ReliefSurface& surface, int cuts) {
+  std::vector<Vec3> points;
+  for (std::uint32_t face = 0; face < surface.base().mesh().triangles().size(); ++face) {
+    const ReliefFrame frame = surface.frame(face);
+    for (int i = 0; i <= cuts; ++i) {
+      for (int j = 0; i + j <= cuts; ++j)
+        points.push_back(surface.point(frame, static_cast<double>(i) / cuts, static_cast<double>(j) / cuts).point);
+    }
+  }
+  return points;
+}
+
+TEST(Closing, where_it_filled_a_free_ball_holds_what_is_above_and_none_of_many_holds_what_is_below) {
+  // Told by points of the relief alone: nothing here knows how heights were found.
+  const double radius = 2e-3;
+  const auto open = coated(plane_grid(0.01, 0.01, 2, 2), wavy_map(0.8e-3, 32), Mapping::triplanar, 4e-3);
+  const ClosedRelief closed = must(close_relief(*open, {radius, 32}));
+  const std::vector<Vec3> points = points_of(*open, 128);
+  const auto lowest_free = [&](const Vec3& foot) {
+    // Height of the lowest ball over a place that is above all points.
+    double most = -infinity;
+    for (const Vec3& p : points) {
+      const double across = radius * radius - (p - foot).head<2>().squaredNorm();
+      if (across > 0.0) most = std::max(most, p.z() + std::sqrt(across));
+    }
+    return most;
+  };
+  Rng rng(4);
+  int filled = 0;
+  for (int tries = 0; tries < 4000 && filled < 10; ++tries) {
+    const std::uint32_t face = random_face(rng, open->base().mesh());
+    const auto i = static_cast<int>(rng.below(33));
+    const auto j = static_cast<int>(rng.below(33));
+    if (i + j > 32) continue;
+    const AtlasTile tile = atlas_tile(closed.atlas, face);
+    if (static_cast<double>(closed.rise[tile.at(i, j)]) < 20e-3 * radius) continue;
+    const Vec3 base = point_on(open->base().mesh(), face, Vec3(1.0 - (i + j) / 32.0, i / 32.0, j / 32.0));
+    if (base.head<2>().cwiseAbs().maxCoeff() > 5e-3 - 1.1 * radius) continue;
+    ++filled;
+    // Over a plane the shell's rays are upright: the lowest underside of all balls over a grid of feet, then finer.
+    const auto underside = [&](const Vec3& foot) {
+      const double across = radius * radius - (foot - base).head<2>().squaredNorm();
+      return across > 0.0 ? lowest_free(foot) - std::sqrt(across) : infinity;
+    };
+    // The undersides meet in creases, along which steps of a grid get stuck: by chance, and ever nearer to the best.
+    double best = infinity;
+    Vec3 at = base;
+    for (double reach = radius; reach > 1e-4 * radius; reach *= reach == radius ? 0.1 : 0.6) {
+      const Vec3 around = at;
+      for (int k = 0; k < (reach == radius ? 1500 : 120); ++k) {
+        const Vec3 foot =
+            (reach == radius ? base : around) + Vec3(rng.uniform(-reach, reach), rng.uniform(-reach, reach), 0.0);
+        if (const double here = underside(foot); here < best) {
+          best = here;
+          at = foot;
+        }
+      }
+    }
+    const auto height = static_cast<double>(closed.atlas.heights[tile.at(i, j)]);
+    EXPECT_LE(height, best + 1e-3 * radius) << "face " << face << ", texel " << i << ", " << j;
+    EXPECT_GE(height, best - 1e-3 * radius) << "face " << face << ", texel " << i << ", " << j;
+  }
+  EXPECT_EQ(filled, 10);
+}
+
+TEST(Closing, no_texel_is_below_the_relief_that_it_was_made_from) {
+  const auto open = ringed_cup();
+  const ClosedRelief closed = must(close_relief(*open, {1.5e-3, 24}));
+  for (std::uint32_t face = 0; face < open->base().mesh().triangles().size(); ++face) {
+    const ReliefFrame frame = open->frame(face);
+    const AtlasTile tile = atlas_tile(closed.atlas, face);
+    for (int i = 0; i <= 24; ++i) {
+      for (int j = 0; i + j <= 24; ++j) {
+        const double height = open->height(frame, i / 24.0, j / 24.0).height;
+        ASSERT_GE(static_cast<double>(closed.atlas.heights[tile.at(i, j)]), height - 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Closing, carries_a_normal_map_where_nothing_was_filled_and_the_fillets_own_normals_elsewhere) {
+  const TriangleMesh mesh = mesh_of(valley(degrees(90.0), 6e-3));
+  // Normals that lean the same way everywhere, over heights that are level.
+  Image image;
+  image.width = image.height = 4;
+  image.channels = 3;
+  for (int k = 0; k < 16; ++k) {
+    for (const std::uint16_t code : {std::uint16_t{166}, std::uint16_t{153}, std::uint16_t{245}})
+      image.samples.push_back(code);
+  }
+  NormalMapSettings as;
+  auto maps = std::make_shared<const Mesostructure>(
+      must(Mesostructure::build(flat_map(0.3e-3), must(NormalMap::build(image, as)), Vec2(4e-3, 4e-3))));
+  CoatSettings settings;
+  settings.mapping = Mapping::triplanar;
+  const auto open = must(make_relief(MeshSurface(TriangleIndex::build(mesh)), *maps, settings));
+  const ClosedRelief closed = must(close_relief(*open, {1.5e-3, 32}));
+  const auto worn = must(wear_closed(*open, closed));
+  ASSERT_TRUE(worn->coat().maps().has_normal_map());
+  Rng rng(9);
+  int kept = 0;
+  int filled = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const std::uint32_t face = random_face(rng, mesh);
+    const Vec3 at = random_barycentric(rng, 0.03);
+    const Vec3 place = point_on(mesh, face, at);
+    const double along = std::hypot(place.x(), place.z());
+    const Vec3 before = open->coat_sample(face, at).normal;
+    const Vec3 after = worn->coat_sample(face, at).normal;
+    const double rise = closed.rise_at(face, at);
+    if (rise == 0.0 && along > 2.6e-3) {
+      ++kept;
+      ASSERT_LT((after - before).norm(), 2e-3) << "face " << face;
+    } else if (rise > 0.1e-3 && along > 0.4e-3 && std::abs(place.y()) < 2.5e-3) {
+      ++filled;
+      const CoatSample sample = worn->coat_sample(face, at);
+      const Vec3 own = (barycentric_frame(mesh, face).normal - sample.gradient).normalized();
+      ASSERT_LT((after - own).norm(), 0.25) << "face " << face << " at " << at.transpose() << ", " << along;
+      ASSERT_GT((after - before).norm(), 0.05) << "face " << face;
+    }
+  }
+  EXPECT_GT(kept, 200);
+  EXPECT_GT(filled, 50);
+}
+
+TEST(Closing, closes_each_level_of_detail_by_itself) {
+  const HeightMap heights = wavy_map(0.5e-3, 32);
+  const Vec2 tile(5e-3, 5e-3);
+  DetailSettings detail;
+  detail.kind = DetailKind::low_pass;
+  detail.levels = 3;
+  const auto pyramid = std::make_shared<const DetailPyramid>(must(DetailPyramid::build(heights, tile, detail)));
+  const Mesostructure maps = must(Mesostructure::build(heights, tile)).with_detail(pyramid);
+  CoatSettings settings;
+  settings.mapping = Mapping::triplanar;
+  const TriangleMesh mesh = mesh_of(icosphere(2, 0.02));
+  const auto open = must(make_relief(MeshSurface(TriangleIndex::build(mesh)), maps, settings));
+  const ClosedRelief closed = must(close_relief(*open, {3e-3, 16}));
+  EXPECT_GT(closed.report.changed_texels, 1000U);
+  ASSERT_EQ(closed.levels.size(), 3U);
+  const auto worn = must(wear_closed(*open, closed));
+  ASSERT_EQ(worn->coat().levels(), 3);
+  Rng rng(2);
+  for (int level = 0; level <= 3; ++level) {
+    // The same level as a coat of its own, closed.
+    const HeightMap& own = level == 0 ? heights : pyramid->map(level);
+    const auto alone =
+        must(make_relief(MeshSurface(TriangleIndex::build(mesh)), must(Mesostructure::build(own, tile)), settings));
+    const auto right = must(wear_closed(*alone, must(close_relief(*alone, {3e-3, 16}))));
+    const CoatMoment moment{static_cast<double>(level), 0.0};
+    for (int k = 0; k < 100; ++k) {
+      const std::uint32_t face = random_face(rng, mesh);
+      const Vec3 at = random_barycentric(rng, 0.05);
+      ASSERT_NEAR(worn->height(worn->frame(face, moment), at[1], at[2]).height,
+                  right->height(right->frame(face), at[1], at[2]).height, 5e-6)
+          << "level " << level;
+    }
+  }
+}
+
+TEST(Closing, closes_the_sum_of_a_coats_layers) {
+  const TriangleMesh mesh = mesh_of(icosphere(2, 0.02));
+  CoatSettings settings;
+  settings.mapping = Mapping::triplanar;
+  CoatParts parts;
+  parts.maps.push_back(tiled(wavy_map(0.1e-3, 16), 3e-3));
+  parts.layers.push_back({tiled(wavy_map(0.2e-3, 16), 3e-3), Vec2::Ones(), nullptr});
+  const auto layered = must(make_relief(MeshSurface(TriangleIndex::build(mesh)), std::move(parts), settings));
+  const auto summed =
+      must(make_relief(MeshSurface(TriangleIndex::build(mesh)), *tiled(wavy_map(0.3e-3, 16), 3e-3), settings));
+  const ClosedRelief one = must(close_relief(*layered, {2e-3, 16}));
+  const ClosedRelief other = must(close_relief(*summed, {2e-3, 16}));
+  EXPECT_GT(one.report.changed_texels, 500U);
+  EXPECT_NEAR(one.report.largest_rise, other.report.largest_rise, 2e-6);
+}
+
 }  // namespace
 }  // namespace asperity::closing_test

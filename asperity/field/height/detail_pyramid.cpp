@@ -419,6 +419,24 @@ Result<DetailPyramid> DetailPyramid::build(const HeightMap& heights, const Vec2&
   return pyramid;
 }
 
+Result<DetailPyramid> DetailPyramid::build(const HeightMap& heights, std::vector<HeightMap> levels,
+                                           const DetailPyramid& like) {
+  bool fits = levels.size() == static_cast<std::size_t>(like.levels());
+  for (const HeightMap& level : levels)
+    fits = fits && level.width() == heights.width() && level.height() == heights.height();
+  if (!fits) {
+    return refused(ErrorCode::mismatch,
+                   fmt::format("are {}, the pyramid like which they are has {}", levels.size(), like.levels()),
+                   "levels", "as many, of the size of the map");
+  }
+  DetailPyramid pyramid;
+  pyramid.kind_ = like.kind_;
+  pyramid.finest_ = like.finest_;
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    ASPERITY_CHECK(pyramid.add(heights, std::move(levels[i]), like.scales_[i]));
+  return pyramid;
+}
+
 Status DetailPyramid::add(const HeightMap& heights, HeightMap level, double scale) {
   std::vector<float> difference = tabulated(
       heights.width(), heights.height(), [&](const Vec2& st) { return level.height_at(st) - heights.height_at(st); });

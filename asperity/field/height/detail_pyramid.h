@@ -51,6 +51,11 @@ class DetailPyramid {
   /// (before anything is allocated). [build]
   static Result<DetailPyramid> build(const HeightMap& heights, const Vec2& tile, const DetailSettings& settings);
 
+  /// Of levels that were made otherwise, each as large as `heights`, with the kind and the scales of `like`, of which
+  /// there are as many. Errors: mismatch, too_large. [build]
+  static Result<DetailPyramid> build(const HeightMap& heights, std::vector<HeightMap> levels,
+                                     const DetailPyramid& like);
+
   [[nodiscard]] DetailKind kind() const noexcept { return kind_; }
   /// Levels beside the map itself. [any]
   [[nodiscard]] int levels() const noexcept { return static_cast<int>(maps_.size()); }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "asperity/core/result.h"
+#include "asperity/core/work.h"
 #include "asperity/field/height/surface_features.h"
 #include "asperity/geometry/contact.h"
 #include "asperity/surface/parametric/patches.h"

@@ -67,8 +67,7 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, const Shell& shell, in
       progress);
 }
 
-Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& heights,
-                                const Progress& progress) {
+Result<ReliefAtlas> flat_atlas(const TriangleMesh& mesh, int texels) {
   if (texels < 2) return bad_value(fmt::format("is {}", texels), "texels", "2 texels an edge or more");
   const std::size_t faces = mesh.triangles().size();
   const Layout layout(faces, texels);
@@ -84,39 +83,59 @@ Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const Texe
   atlas.heights.assign(static_cast<std::size_t>(atlas.width) * static_cast<std::size_t>(atlas.height), 0.0F);
   atlas.corner_uvs.resize(faces);
   const double inset = border + 0.5;
+  const double far = layout.tile - inset;
+  const Vec2 local[3] = {Vec2(inset, inset), Vec2(inset + texels, inset), Vec2(inset, inset + texels)};
   for (std::size_t face = 0; face < faces; ++face) {
     const int tile = static_cast<int>(face / 2);
-    const double x0 = tile % layout.columns * layout.tile;
-    const double y0 = tile / layout.columns * layout.tile;
-    const bool upper = face % 2 == 1;
-    const double far = layout.tile - inset;
-    const Vec2 local[3] = {Vec2(inset, inset), Vec2(inset + texels, inset), Vec2(inset, inset + texels)};
-    Vec2 corner[3];
-    for (int k = 0; k < 3; ++k) {
-      const Vec2 at = upper ? Vec2(Vec2(far + inset, far + inset) - local[k]) : local[k];
-      // The corners as floats hold them: heights are taken where the coat will read them.
-      const Vec2f uv(static_cast<float>((x0 + at.x()) / atlas.width), static_cast<float>((y0 + at.y()) / atlas.height));
-      atlas.corner_uvs[face][static_cast<std::size_t>(k)] = uv;
-      corner[k] = uv.cast<double>().cwiseProduct(Vec2(atlas.width, atlas.height));
+    const Vec2 first(tile % layout.columns * layout.tile, tile / layout.columns * layout.tile);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec2 at = first + (face % 2 == 1 ? Vec2(Vec2(far + inset, far + inset) - local[k]) : local[k]);
+      atlas.corner_uvs[face][k] =
+          Vec2f(static_cast<float>(at.x() / atlas.width), static_cast<float>(at.y() / atlas.height));
     }
+  }
+  return atlas;
+}
+
+AtlasTile atlas_tile(const ReliefAtlas& atlas, std::uint32_t face) noexcept {
+  const Layout layout(atlas.corner_uvs.size(), atlas.texels);
+  const auto tile = static_cast<int>(face / 2);
+  const bool upper = face % 2 == 1;
+  const int corner = upper ? layout.tile - 1 - border : border;
+  const int x = tile % layout.columns * layout.tile + corner;
+  const int y = tile / layout.columns * layout.tile + corner;
+  const std::ptrdiff_t onward = upper ? -1 : 1;
+  return {static_cast<std::size_t>(atlas.height - 1 - y) * static_cast<std::size_t>(atlas.width) +
+              static_cast<std::size_t>(x),
+          onward, -onward * atlas.width, border, atlas.texels + 2 * border - (upper ? 2 : 1)};
+}
+
+Result<ReliefAtlas> bake_relief(const TriangleMesh& mesh, int texels, const TexelHeight& heights,
+                                const Progress& progress) {
+  ASPERITY_TRY(ReliefAtlas atlas, flat_atlas(mesh, texels));
+  const std::size_t faces = mesh.triangles().size();
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    // The corners as floats hold them: heights are taken where the coat will read them.
+    Vec2 corner[3];
+    for (std::size_t k = 0; k < 3; ++k)
+      corner[k] = atlas.corner_uvs[face][k].cast<double>().cwiseProduct(Vec2(atlas.width, atlas.height));
     const Vec2 along_u = corner[1] - corner[0];
     const Vec2 along_v = corner[2] - corner[0];
     const double det = along_u.x() * along_v.y() - along_u.y() * along_v.x();
-    for (int y = 0; y < layout.tile; ++y) {
-      for (int x = 0; x < layout.tile; ++x) {
-        if ((x + y >= layout.tile) != upper) continue;
-        const Vec2 offset = Vec2(x0 + x + 0.5, y0 + y + 0.5) - corner[0];
+    const AtlasTile tile = atlas_tile(atlas, face);
+    const Vec2 first(static_cast<double>(tile.origin % static_cast<std::size_t>(atlas.width)) + 0.5,
+                     atlas.height - static_cast<double>(tile.origin / static_cast<std::size_t>(atlas.width)) - 0.5);
+    const auto onward = static_cast<double>(tile.right);
+    // Row by row of the picture from its foot, whichever way the face lies in it.
+    const int rows = tile.most_sum + 2 * tile.border;
+    for (int row = 0; row <= rows; ++row) {
+      const int j = tile.right > 0 ? row - tile.border : rows - tile.border - row;
+      for (int column = 0; column <= tile.most_sum - j + tile.border; ++column) {
+        const int i = tile.right > 0 ? column - tile.border : tile.most_sum - j - column;
+        const Vec2 offset = first + onward * Vec2(i, j) - corner[0];
         const double u = (offset.x() * along_v.y() - offset.y() * along_v.x()) / det;
         const double v = (along_u.x() * offset.y() - along_u.y() * offset.x()) / det;
-        const auto row = static_cast<std::size_t>(atlas.height - 1 - (static_cast<int>(y0) + y));
-        const auto column = static_cast<std::size_t>(x0) + static_cast<std::size_t>(x);
-        const std::ptrdiff_t onward = upper ? -1 : 1;
-        const AtlasTexel texel{static_cast<std::uint32_t>(face),
-                               u,
-                               v,
-                               row * static_cast<std::size_t>(atlas.width) + column,
-                               onward,
-                               -onward * atlas.width};
+        const AtlasTexel texel{face, u, v, tile.at(i, j), tile.right, tile.up};
         const double height = heights(texel);
         if (!std::isfinite(height)) {
           return bad_value(fmt::format("the ray from barycentric ({:.3g}, {:.3g}) meets nothing", u, v),

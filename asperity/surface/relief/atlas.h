@@ -26,6 +26,24 @@ struct ReliefAtlas {
   int texels = 0;                                ///< along each edge of a triangle
 };
 
+/// Where an atlas holds a face: the place with barycentric coordinates u = i / texels, v = j / texels (outside the
+/// triangle in its border) is the texel at origin + i right + j up.
+struct AtlasTile {
+  std::size_t origin = 0;
+  std::ptrdiff_t right = 1;
+  std::ptrdiff_t up = 1;
+  int border = 0;    ///< i and j are no less than minus this ...
+  int most_sum = 0;  ///< ... and i + j no more than this
+  [[nodiscard]] std::size_t at(int i, int j) const noexcept {
+    return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(origin) + i * right + j * up);
+  }
+};
+
+/// An atlas of heights 0. Errors: bad_value (texels below 2), too_large. [build]
+Result<ReliefAtlas> flat_atlas(const TriangleMesh& mesh, int texels);
+/// Where it holds a face. [any]
+AtlasTile atlas_tile(const ReliefAtlas& atlas, std::uint32_t face) noexcept;
+
 /// Bakes with `texels` texels along each edge of a triangle. The heights are along the directions of `shell`, which the
 /// mesh that wears the atlas must have too (the same positions give the same directions). For those who find heights
 /// on their own; of a formula relief_bake.h finds them. Errors: bad_value (texels

@@ -262,18 +262,29 @@ Result<TriangleMesh> with_atlas_uvs(const TriangleMesh& mesh, const ReliefAtlas&
   return TriangleMesh::build(std::move(source), MeshBuildSettings{1.0, false});
 }
 
+Result<HeightMap> atlas_heights(const ReliefAtlas& atlas, const std::vector<float>& heights) {
+  return HeightMap::build(heights, atlas.width, atlas.height, Wrap::clamp, Reconstruction::quadratic_bspline);
+}
+
+Vec2 atlas_size(const TriangleMesh& mesh, const ReliefAtlas& atlas) noexcept {
+  const double texel = mesh.mean_edge() / atlas.texels;
+  return {texel * atlas.width, texel * atlas.height};
+}
+
 Result<std::shared_ptr<const ReliefSurface>> wear_atlas(const TriangleMesh& mesh, const ReliefAtlas& atlas,
                                                         const ReliefSettings& settings) {
-  ASPERITY_TRY(HeightMap heights, HeightMap::build(atlas.heights, atlas.width, atlas.height, Wrap::clamp,
-                                                   Reconstruction::quadratic_bspline));
-  const double texel = mesh.mean_edge() / atlas.texels;
-  ASPERITY_TRY(Mesostructure maps,
-               Mesostructure::build(std::move(heights), Vec2(texel * atlas.width, texel * atlas.height)));
+  ASPERITY_TRY(HeightMap heights, atlas_heights(atlas, atlas.heights));
+  ASPERITY_TRY(Mesostructure maps, Mesostructure::build(std::move(heights), atlas_size(mesh, atlas)));
+  return wear_atlas(mesh, atlas.texels, std::move(maps), settings);
+}
+
+Result<std::shared_ptr<const ReliefSurface>> wear_atlas(const TriangleMesh& mesh, int texels, Mesostructure maps,
+                                                        const ReliefSettings& settings) {
   CoatSettings coat;
   coat.stitching.folds = FoldMode::round;
   // Half a texel: enough to join what differs by rounding and reconstruction alone.
-  coat.stitching.rho = std::clamp(0.6 / atlas.texels, 0.005, 0.05);
-  coat.stitching.most_rounding = 0.25 * texel;
+  coat.stitching.rho = std::clamp(0.6 / texels, 0.005, 0.05);
+  coat.stitching.most_rounding = 0.25 * mesh.mean_edge() / texels;
   return make_relief(MeshSurface(TriangleIndex::build(mesh)), std::move(maps), coat, settings);
 }
 

@@ -95,5 +95,12 @@ Result<TriangleMesh> with_atlas_uvs(const TriangleMesh& mesh, const ReliefAtlas&
 /// [build]
 Result<std::shared_ptr<const ReliefSurface>> wear_atlas(const TriangleMesh& mesh, const ReliefAtlas& atlas,
                                                         const ReliefSettings& settings = {});
+/// The same of maps that were made of the atlas: its heights, with normals or levels of detail beside. [build]
+Result<std::shared_ptr<const ReliefSurface>> wear_atlas(const TriangleMesh& mesh, int texels, Mesostructure maps,
+                                                        const ReliefSettings& settings);
+/// Heights laid out as an atlas's, as the spline that wear_atlas makes of them. [build]
+Result<HeightMap> atlas_heights(const ReliefAtlas& atlas, const std::vector<float>& heights);
+/// Size of one repeat of an atlas (m): its texels are as large as those along the mesh's mean edge. [build]
+Vec2 atlas_size(const TriangleMesh& mesh, const ReliefAtlas& atlas) noexcept;
 
 }  // namespace asperity
