@@ -237,7 +237,7 @@ Result<Instance> wall_through(const Box& bounds) {
 // ---- rows
 
 /// A probe that is led along a path over a scene, tick by tick.
-struct Led {
+struct LedProbe {
   const Scene& scene;
   const std::vector<Vec3>& path;
   ProxyState state = {};
@@ -255,7 +255,7 @@ struct Led {
 
 /// What the ticks were like, whatever they took.
 void count(const Scene& scene, const std::vector<Vec3>& path, RealRow& row) {
-  Led led{scene, path};
+  LedProbe led{scene, path};
   std::vector<std::uint32_t> work;
   work.reserve(path.size());
   Vec3 last_force = Vec3::Zero();
@@ -280,13 +280,13 @@ void count(const Scene& scene, const std::vector<Vec3>& path, RealRow& row) {
 /// A tick from its state, caches empty and cold, the least of 20 times: what the machine does meanwhile meets each of
 /// these alike, and the least of them hardly at all.
 double time_again(const Scene& scene, const std::vector<Vec3>& path, std::size_t tick, double clock_cost) {
-  Led led{scene, path};
+  LedProbe led{scene, path};
   for (std::size_t before = 0; before < tick; ++before) led.go(before);
   const ProxyState from = led.state;
   double least = infinity;
   CacheSweep sweep;
   for (int i = 0; i < 20; ++i) {
-    Led again{scene, path, from};
+    LedProbe again{scene, path, from};
     sweep.run();
     const Clock::time_point start = Clock::now();
     again.go(tick);
@@ -321,7 +321,7 @@ std::size_t run_passes(std::size_t ticks, int passes, double clock_cost, const S
 
 /// By a law, over any body.
 void run(const Scene& scene, const std::vector<Vec3>& path, int passes, double clock_cost, RealRow& row) {
-  Led led{scene, path};
+  LedProbe led{scene, path};
   const auto start = [&] {
     led.state = {};
     led.cache = {};
@@ -341,7 +341,7 @@ void run_bare(const Scene& scene, const std::vector<Vec3>& path, double clock_co
         [&](std::size_t tick) { return std::isfinite(peer.closest(path[tick], peer_bound)); }, row);
     return;
   }
-  Led led{scene, path};
+  LedProbe led{scene, path};
   const auto start = [&] {
     led.state = {};
     led.cache = {};

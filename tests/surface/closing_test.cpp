@@ -127,6 +127,39 @@ TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their
   EXPECT_EQ(result.maps.report.unsettled_texels, 0U);
 }
 
+TEST(Closing, a_ball_comes_into_a_groove_from_beside_the_rim) {
+  constexpr double width = 8e-3;
+  constexpr double radius = 1e-3;
+  const auto open = coated(plane_grid(width, width, 1, 1),
+                           map_of(
+                               128, [&](double s, double) { return profile((s - 0.5) * width); }, Wrap::clamp),
+                           Mapping::uv, width);
+  const Closed result = closed(open, radius, 96);
+  const TriangleMesh& mesh = open->base().mesh();
+  int at_rim = 0;
+  double filled = 0.0;
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto [a, b, c] = mesh.corners(face);
+    for (int i = 0; i <= 96; ++i) {
+      for (int j = 0; i + j <= 96; ++j) {
+        const Vec3 at(1.0 - (i + j) / 96.0, i / 96.0, j / 96.0);
+        const Vec3 place = at[0] * a + at[1] * b + at[2] * c;
+        const double rise = result.maps.rise_at(face, at);
+        if (std::abs(place.y()) > 0.5 * width - 1e-9) {
+          // It touches the groove's end at its own height, out over the rim.
+          ++at_rim;
+          ASSERT_LE(rise, 1e-3 * radius) << place.transpose();
+        } else if (std::abs(place.y()) < 1e-3) {
+          filled = std::max(filled, rise);
+        }
+      }
+    }
+  }
+  // The other triangle has a corner on each.
+  EXPECT_EQ(at_rim, 2 * 97 + 2);
+  EXPECT_GT(filled, 0.3e-3);
+}
+
 TEST(Closing, what_the_ball_reaches_everywhere_keeps_its_height) {
   const auto open = coated(icosphere(1, 0.02), wavy_map(0.05e-3, 16), Mapping::triplanar, 0.02);
   const Closed result = closed(open, 1e-3, 24);

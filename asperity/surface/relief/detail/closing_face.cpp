@@ -28,6 +28,7 @@ FaceCloser::FaceCloser(const ReliefSurface& surface, const ReliefSamples& sample
                        double radius, double tolerance)
     : surface_(surface),
       samples_(samples),
+      moment_(moment),
       radius_(radius),
       tolerance_(tolerance),
       solver_(surface, samples, moment, radius) {}
@@ -49,6 +50,12 @@ double FaceCloser::entered(const RestingBall& ball, const Texel& texel) const {
 
 bool FaceCloser::holds_lowest(const RestingBall& ball, const Vec3& place) const {
   return ball.count == 3 && (ball.cone * (place - ball.centre)).minCoeff() >= least_share;
+}
+
+bool FaceCloser::at_rim(const Texel& texel) const {
+  const TriangleMesh& mesh = surface_.base().mesh();
+  const auto rim = [&](int edge) { return mesh.neighbour(face_, edge) == no_index; };
+  return (texel.i + texel.j == texels_ && rim(1)) || (texel.i == 0 && rim(2)) || (texel.j == 0 && rim(0));
 }
 
 FaceCloser::Texel FaceCloser::texel_at(int i, int j) const {
@@ -74,6 +81,73 @@ RestingBall FaceCloser::own_ball(const Texel& texel) const {
   return ball;
 }
 
+void FaceCloser::add_normals(std::uint32_t face, const double (&share)[3], Normals& normals) const {
+  const TriangleMesh& mesh = surface_.base().mesh();
+  const TriangleMesh::Triangle& corners = mesh.triangles()[face_];
+  double there[3] = {0.0, 0.0, 0.0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (share[k] > 0.0) there[mesh.corner_of(face, corners[k])] = share[k];
+  }
+  const ReliefPoint spot = surface_.point(surface_.frame(face, moment_), there[1], there[2]);
+  const auto add = [&](const Vec3& normal) {
+    if (normals.directions.size() < normals.directions.capacity()) normals.directions.push_back(normal);
+  };
+  add(spot.front);
+  const Vec3 inwards[3] = {-spot.along_u - spot.along_v, spot.along_u, spot.along_v};
+  const Vec3 edges[3] = {spot.along_v - spot.along_u, spot.along_v, spot.along_u};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (there[k] != 0.0 || mesh.neighbour(face, static_cast<int>((k + 1) % 3)) != no_index) continue;
+    const Vec3 along = edges[k].normalized();
+    add((inwards[k].dot(along) * along - inwards[k]).normalized());
+    normals.at_rim = true;
+  }
+}
+
+FaceCloser::Normals FaceCloser::normals_around(const Texel& texel) const {
+  const TriangleMesh& mesh = surface_.base().mesh();
+  const double share[3] = {static_cast<double>(texels_ - texel.i - texel.j) / texels_,
+                           static_cast<double>(texel.i) / texels_, static_cast<double>(texel.j) / texels_};
+  Normals normals;
+  add_normals(face_, share, normals);
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (share[k] == 1.0) {
+      for (const std::uint32_t other : mesh.faces_of_vertex(mesh.triangles()[face_][k])) {
+        if (other != face_) add_normals(other, share, normals);
+      }
+    } else if (share[k] == 0.0 && std::max(share[(k + 1) % 3], share[(k + 2) % 3]) < 1.0) {
+      const std::uint32_t other = mesh.neighbour(face_, static_cast<int>((k + 1) % 3));
+      if (other != no_index) add_normals(other, share, normals);
+    }
+  }
+  return normals;
+}
+
+bool FaceCloser::rests_on_crease(const Texel& texel, Vec3& centre) {
+  const Normals normals = normals_around(texel);
+  // Beside a rim little may be free, and rims are few.
+  const int steps = normals.at_rim ? 16 : 2;
+  // Nearer to the face's own normal they say nothing else.
+  constexpr double apart = 0.985;
+  const std::size_t starts = normals.at_rim ? normals.directions.size() : 1;
+  const Vec3 place = texel.ray.at(texel.lowest);
+  const auto rests = [&](const Vec3& normal) {
+    centre = place + radius_ * normal;
+    return solver_.is_free(centre, touched_of_radius);
+  };
+  if (rests(normals.directions[0])) return true;
+  for (std::size_t one = 0; one < starts; ++one) {
+    for (std::size_t other = one + 1; other < normals.directions.size(); ++other) {
+      if (!normals.at_rim && normals.directions[one].dot(normals.directions[other]) > apart) continue;
+      for (int step = 1; step <= steps; ++step) {
+        const double share = static_cast<double>(step) / steps;
+        const Vec3 between = (1.0 - share) * normals.directions[one] + share * normals.directions[other];
+        if (between.norm() > 0.1 && rests(between.normalized())) return true;
+      }
+    }
+  }
+  return false;
+}
+
 bool FaceCloser::blocks(const RestingBall& ball, const Vec3& centre) const {
   const double within = radius_ * (1.0 - blocked_of_radius);
   for (int k = 0; k < ball.count; ++k) {
@@ -92,10 +166,19 @@ bool FaceCloser::bound(const Texel& texel, int di, int dj) {
   const double v = static_cast<double>(dj) / texels_;
   const Vec3 turn = u * prism_.turn_u + v * prism_.turn_v;
   const Vec3 half = u * prism_.edge_u + v * prism_.edge_v + one.lower * turn;
-  const double difference = std::abs(other.lower - one.lower);
-  const double reach = half.squaredNorm() + texel.scale * texel.scale * difference * difference;
-  const double dip = 0.5 * reach / (radius_ * texel.scale) + 0.5 * difference * turn.norm() / texel.scale;
-  here.lower = std::max(texel.lowest, 0.5 * (one.lower + other.lower) - dip);
+  const double difference = other.lower - one.lower;
+  const Vec3 chord = half + (0.5 * difference) * texel.ray.direction;
+  const double square = chord.squaredNorm();
+  here.lower = texel.lowest;
+  if (square < radius_ * radius_) {
+    // Along the ray, which stands on the chord at this angle.
+    const double lean = chord.dot(texel.ray.direction) / (std::sqrt(square) * texel.scale);
+    const double cosine = std::sqrt(std::max(0.0, 1.0 - lean * lean));
+    const double middle = std::sqrt(radius_ * radius_ - square);
+    const double dip = std::sqrt(square + middle * middle * cosine * cosine) - middle * cosine +
+                       0.5 * std::abs(difference) * turn.norm();
+    here.lower = std::max(texel.lowest, 0.5 * (one.lower + other.lower) - dip / texel.scale);
+  }
   // Any free ball is a bound from above.
   here.upper = infinity;
   // Those over the ends, and over the other corners of the two triangles of which they make an edge.
@@ -124,6 +207,12 @@ void FaceCloser::settle_texel(const Texel& texel, const Known* before) {
   Known& here = known(texel.i, texel.j);
   const double shallow = texel.lowest + shallow_of_radius * radius_ / texel.scale;
   RestingBall own = own_ball(texel);
+  const bool on_edge = texel.i == 0 || texel.j == 0 || texel.i + texel.j == texels_;
+  if (Vec3 centre; on_edge && rests_on_crease(texel, centre)) {
+    own.centre = centre;
+    here = {texel.lowest, texel.lowest, add(own)};
+    return;
+  }
   if (before != nullptr && before->ball != no_index) {
     const RestingBall& ball = balls_[before->ball];
     const double height = entered(ball, texel);
@@ -188,7 +277,8 @@ void FaceCloser::close_texels(int stride, bool coarsest) {
       const Known* start = last;
       if (!coarsest) {
         const bool between = i + std::abs(di) + j + dj <= texels_ && i + di + j + dj <= texels_;
-        if (between && bound(texel, di, dj)) continue;
+        // Beside a rim a ball may hold what lies between from below the line through both.
+        if (between && !at_rim(texel) && bound(texel, di, dj)) continue;
         const Known& one = known(i - di, j - dj);
         start = &one;
         if (between && known(i + di, j + dj).ball == known(i, j).ball) start = &known(i + di, j + dj);

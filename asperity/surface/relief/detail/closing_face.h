@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "asperity/core/fixed_vector.h"
 #include "asperity/surface/relief/closing.h"
 #include "asperity/surface/relief/detail/closing_ball.h"
 
@@ -41,6 +42,7 @@ class FaceCloser {
     std::uint32_t ball = no_index;  ///< that holds it at `upper`
   };
   [[nodiscard]] Texel texel_at(int i, int j) const;
+  [[nodiscard]] bool at_rim(const Texel& texel) const;
   [[nodiscard]] Known& known(int i, int j) {
     return known_[static_cast<std::size_t>(i * (2 * texels_ + 3 - i) / 2 + j)];
   }
@@ -55,6 +57,18 @@ class FaceCloser {
   /// Whether what holds a ball holds it lowest there.
   [[nodiscard]] bool holds_lowest(const RestingBall& ball, const Vec3& place) const;
   [[nodiscard]] RestingBall own_ball(const Texel& texel) const;
+  /// Ways off the relief where faces meet.
+  struct Normals {
+    FixedVector<Vec3, 24> directions;
+    bool at_rim = false;
+  };
+  /// Normals of the relief over the faces that meet in a texel on an edge or a corner of this one, its own first; at a
+  /// rim also what leads out over it.
+  [[nodiscard]] Normals normals_around(const Texel& texel) const;
+  void add_normals(std::uint32_t face, const double (&share)[3], Normals& normals) const;
+  /// Whether a free ball rests on a texel where the relief may have a crease: on any normal between those around.
+  /// Then `centre` is that ball's.
+  bool rests_on_crease(const Texel& texel, Vec3& centre);
   /// Whether some contact of a ball lies in another one.
   [[nodiscard]] bool blocks(const RestingBall& ball, const Vec3& centre) const;
   std::uint32_t add(const RestingBall& ball);
@@ -70,6 +84,7 @@ class FaceCloser {
 
   const ReliefSurface& surface_;
   const ReliefSamples& samples_;
+  CoatMoment moment_;
   double radius_;
   double tolerance_;
   BallSolver solver_;
