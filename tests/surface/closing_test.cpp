@@ -78,13 +78,18 @@ double profile(double x) {
          dip(1.4e-3, 0.6e-3, 0.6e-3);
 }
 
+/// A square sheet, its grooves across it from rim to rim. `width` in m.
+std::shared_ptr<const ReliefSurface> grooved_sheet(double width) {
+  return coated(plane_grid(width, width, 1, 1),
+                map_of(
+                    128, [&](double s, double) { return profile((s - 0.5) * width); }, Wrap::clamp),
+                Mapping::uv, width);
+}
+
 TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their_profile) {
   constexpr double width = 8e-3;
   constexpr double radius = 1e-3;
-  const auto open = coated(plane_grid(width, width, 1, 1),
-                           map_of(
-                               128, [&](double s, double) { return profile((s - 0.5) * width); }, Wrap::clamp),
-                           Mapping::uv, width);
+  const auto open = grooved_sheet(width);
   const Closed result = closed(open, radius, 96);
   // Greyscale closing of the profile, sampled every 4 um: dilation by the disc, then erosion.
   constexpr double step = 4e-6;
@@ -130,10 +135,7 @@ TEST(Closing, grooves_inside_one_relief_are_filled_as_a_rolling_disc_fills_their
 TEST(Closing, a_ball_comes_into_a_groove_from_beside_the_rim) {
   constexpr double width = 8e-3;
   constexpr double radius = 1e-3;
-  const auto open = coated(plane_grid(width, width, 1, 1),
-                           map_of(
-                               128, [&](double s, double) { return profile((s - 0.5) * width); }, Wrap::clamp),
-                           Mapping::uv, width);
+  const auto open = grooved_sheet(width);
   const Closed result = closed(open, radius, 96);
   const TriangleMesh& mesh = open->base().mesh();
   int at_rim = 0;
@@ -158,6 +160,29 @@ TEST(Closing, a_ball_comes_into_a_groove_from_beside_the_rim) {
   // The other triangle has a corner on each.
   EXPECT_EQ(at_rim, 2 * 97 + 2);
   EXPECT_GT(filled, 0.3e-3);
+}
+
+TEST(Closing, what_it_raised_taken_off_again_is_the_relief_that_it_was_made_from) {
+  // Beside triangles too: what is worn there tells of the faces around.
+  const auto open = coated(trial_mesh_e(2, std::numbers::pi / 2.0, 0.01),
+                           map_of(64,
+                                  [](double s, double t) {
+                                    const double turn = 2.0 * std::numbers::pi;
+                                    return 1.5e-3 + 0.4e-3 * std::sin(turn * s) * std::sin(turn * t);
+                                  }),
+                           Mapping::uv);
+  const ClosedRelief filled = must(close_relief(*open, {2e-3, 24}));
+  ASSERT_GT(filled.report.changed_share, 0.2);
+  // A ball so small leaves all but the very folds as it was.
+  const ClosedRelief as_it_was = must(close_relief(*open, {1e-4, 24}));
+  ASSERT_EQ(filled.rise.size(), as_it_was.rise.size());
+  std::size_t alike = 0;
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < filled.rise.size(); ++i) {
+    const double lowered = static_cast<double>(filled.atlas.heights[i]) - static_cast<double>(filled.rise[i]);
+    ++(std::abs(lowered - static_cast<double>(as_it_was.atlas.heights[i])) < 1e-5 ? alike : apart);
+  }
+  EXPECT_LT(apart, alike / 500) << "beside " << alike << " texels";
 }
 
 TEST(Closing, what_the_ball_reaches_everywhere_keeps_its_height) {

@@ -66,17 +66,17 @@ ClosedBorders::ClosedBorders(const ReliefSurface& surface, const ReliefSamples& 
   }
 }
 
-double ClosedBorders::height(const ClosedRelief& closed, const AtlasTile& tile, std::uint32_t face, int i,
-                             int j) const noexcept {
+double ClosedBorders::height(const ClosedRelief& closed, const AtlasTile& tile, std::uint32_t face, int i, int j,
+                             bool raised) const noexcept {
   const int nodes = samples_.cuts(face) / texels_;
-  return static_cast<double>(samples_.height(face, i * nodes, j * nodes)) +
-         static_cast<double>(closed.rise[tile.at(i, j)]);
+  const auto before = static_cast<double>(samples_.height(face, i * nodes, j * nodes));
+  return raised ? before + static_cast<double>(closed.rise[tile.at(i, j)]) : before;
 }
 
-ClosedBorders::Slopes ClosedBorders::slopes(const ClosedRelief& closed, std::uint32_t face, double u,
-                                            double v) const noexcept {
+ClosedBorders::Slopes ClosedBorders::slopes(const ClosedRelief& closed, std::uint32_t face, double u, double v,
+                                            bool raised) const noexcept {
   const AtlasTile tile = atlas_tile(closed.atlas, face);
-  const auto at = [&](int i, int j) { return height(closed, tile, face, i, j); };
+  const auto at = [&](int i, int j) { return height(closed, tile, face, i, j, raised); };
   const double x = u * texels_;
   const double y = v * texels_;
   if (texels_ < 3) {
@@ -103,7 +103,7 @@ ClosedBorders::Slopes ClosedBorders::slopes(const ClosedRelief& closed, std::uin
           texels_ * (dj + a * ij + b * jj)};
 }
 
-bool ClosedBorders::follow(const ClosedRelief& closed, const Vec3& origin, const Vec3& direction,
+bool ClosedBorders::follow(const ClosedRelief& closed, const Vec3& origin, const Vec3& direction, bool raised,
                            Beside& beside) const {
   constexpr int most_steps = 12;
   constexpr int most_walks = 6;
@@ -124,7 +124,7 @@ bool ClosedBorders::follow(const ClosedRelief& closed, const Vec3& origin, const
       beside.place.u = guess[1];
       beside.place.v = guess[2];
     }
-    const Slopes there = slopes(closed, beside.face, beside.place.u, beside.place.v);
+    const Slopes there = slopes(closed, beside.face, beside.place.u, beside.place.v, raised);
     const ShellGradients gradients = shell_gradients(beside.prism, beside.place);
     const double rise = (gradients.height - there.u * gradients.u - there.v * gradients.v).dot(direction);
     if (!(rise > 0.1)) return false;
@@ -141,12 +141,13 @@ void ClosedBorders::fill(std::uint32_t face, ClosedRelief& closed) const {
   std::vector<float>& heights = closed.atlas.heights;
   for (int j = 0; j <= texels_; ++j) {
     for (int i = 0; i + j <= texels_; ++i)
-      heights[tile.at(i, j)] = static_cast<float>(height(closed, tile, face, i, j));
+      heights[tile.at(i, j)] = static_cast<float>(height(closed, tile, face, i, j, true));
   }
   std::array<bool, 3> convex{};
   for (std::size_t k = 0; k < 3; ++k) convex[k] = beyond_convex_edge(mesh, face, static_cast<int>(k));
   const ReliefFrame frame = surface_.frame(face, moment_);
   Beside last;
+  Beside before;  // the same of the relief as it was
   for (const BesideTexel& texel : beside_) {
     const std::size_t at = tile.at(texel.i, texel.j);
     const std::size_t nearest = tile.at(texel.nearest[0], texel.nearest[1]);
@@ -161,9 +162,14 @@ void ClosedBorders::fill(std::uint32_t face, ClosedRelief& closed) const {
       if (last.face == no_index) {
         const auto height_near = static_cast<double>(heights[nearest]);
         last = {height_near, face, {u, v, height_near}, frame.prism};
+        const double lower = height_near - static_cast<double>(rise);
+        before = {lower, face, {u, v, lower}, frame.prism};
       }
-      if (follow(closed, frame.prism.base_at(u, v), frame.prism.direction_at(u, v), last)) {
+      const Vec3 origin = frame.prism.base_at(u, v);
+      const Vec3 direction = frame.prism.direction_at(u, v);
+      if (follow(closed, origin, direction, true, last) && follow(closed, origin, direction, false, before)) {
         heights[at] = static_cast<float>(last.height);
+        closed.rise[at] = static_cast<float>(last.height - before.height);
         continue;
       }
       last.face = no_index;

@@ -19,22 +19,23 @@ class ClosedBorders {
   void fill(std::uint32_t face, ClosedRelief& closed) const;
 
  private:
-  /// Heights as closed at a texel of a face, which lies over it.
-  [[nodiscard]] double height(const ClosedRelief& closed, const AtlasTile& tile, std::uint32_t face, int i,
-                              int j) const noexcept;
+  /// Height at a texel of a face, which lies over it: raised as it was closed, or as it was.
+  [[nodiscard]] double height(const ClosedRelief& closed, const AtlasTile& tile, std::uint32_t face, int i, int j,
+                              bool raised) const noexcept;
   struct Slopes {
     double height = 0.0;
     double u = 0.0;
     double v = 0.0;
   };
-  [[nodiscard]] Slopes slopes(const ClosedRelief& closed, std::uint32_t face, double u, double v) const noexcept;
+  [[nodiscard]] Slopes slopes(const ClosedRelief& closed, std::uint32_t face, double u, double v,
+                              bool raised) const noexcept;
   struct Beside {
     double height = 0.0;
     std::uint32_t face = no_index;  ///< whose prism holds the surface there
     ShellPlace place;
     ShellPrism prism;
   };
-  [[nodiscard]] bool follow(const ClosedRelief& closed, const Vec3& origin, const Vec3& direction,
+  [[nodiscard]] bool follow(const ClosedRelief& closed, const Vec3& origin, const Vec3& direction, bool raised,
                             Beside& beside) const;
 
   const ReliefSurface& surface_;
