@@ -34,7 +34,7 @@ struct Options {
   std::size_t updates = 100000;
   std::size_t cold_updates = 200;
   std::size_t counted = 0;  ///< ticks a row for a tool that counts; 0: timed
-  RealEffort real{"../shared/data", 20000, {}, {}, false};
+  RealEffort real;
 };
 
 void say(const std::string& what) {

@@ -34,11 +34,11 @@ struct RealRow {
 
 /// How many ticks, and of what.
 struct RealEffort {
-  std::filesystem::path data;           ///< meshes/, textures/, volumes/
-  std::size_t ticks = 20000;            ///< a row
-  int passes = 3;                       ///< that each tick is timed in, of which the least counts
-  std::string only;                     ///< rows whose "body, stroke, law" holds this text; empty: all
-  std::optional<std::uint32_t> budget;  ///< of each tick; 0: no limit
+  std::filesystem::path data = "../shared/data";  ///< meshes/, textures/, volumes/
+  std::size_t ticks = 20000;                      ///< a row
+  int passes = 3;                                 ///< that each tick is timed in, of which the least counts
+  std::string only;                               ///< rows whose "body, stroke, law" holds this text; empty: all
+  std::optional<std::uint32_t> budget;            ///< of each tick; 0: no limit
   bool every = false;  ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them
 };
 
