@@ -398,7 +398,8 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
       }
     }
     if (!body.bare) pairs.emplace_back("beside a wall", "proxy");
-    ++number;
+    // Rows of the others stay the same.
+    if (!body.bare) ++number;
     std::optional<Experiment> read_by;
     std::string last_law;
     std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
