@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "asperity/core/parallel_for.h"
+#include "asperity/core/processor.h"
 #include "asperity/geometry/bvh.h"
 #include "asperity/geometry/triangle_index.h"
 
@@ -235,8 +236,7 @@ void Bvh::for_each_meeting(const FaceBoxes& boxes, const MeetingVisit& visit) co
   const Join join(*this, boxes);
   const auto leaves = boxes.leaves.size();
 #if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  if (wide) {
+  if (has_avx2()) {
     parallel_for(leaves, {.grain = leaves_a_share},
                  [&](std::size_t leaf) { join.run_avx2(static_cast<std::uint32_t>(leaf), visit); });
     return;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "asperity/core/processor.h"
 #include "asperity/geometry/bvh.h"
 
 namespace asperity {
@@ -196,8 +197,7 @@ void Bvh::refit(const TriangleMesh& mesh, BvhFitting& fitting) noexcept {
   frame(mesh);
   if (nodes_.empty()) return;
 #if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  if (wide) return fit_avx2(fitting);
+  if (has_avx2()) return fit_avx2(fitting);
 #endif
   Fitter::fit_all(*this, fitting);
 }

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "asperity/core/processor.h"
 #include "asperity/surface/detail/four.h"
 #include "asperity/surface/detail/triplanar.h"
 
@@ -445,7 +446,7 @@ ASPERITY_FOUR void triplanar_looks(const CoatFrame& frame, const Vec2& tile, con
 void Coat::triplanar_heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) noexcept {
   TriplanarLooks looks;
 #if defined(__x86_64__)
-  if (four::has_avx2())
+  if (has_avx2())
     triplanar_looks_by_avx2(frame, frame.maps->tile(), u, v, looks);
   else
 #endif

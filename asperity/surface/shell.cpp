@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "asperity/core/parallel_for.h"
+#include "asperity/core/processor.h"
 #include "asperity/surface/detail/four.h"
 
 namespace asperity {
@@ -187,7 +188,7 @@ __attribute__((target("avx2"))) unsigned least_squares_avx2(const TriangleMesh& 
 #endif
 LeastSquaresOfFour best_least_squares() noexcept {
 #if defined(__x86_64__)
-  if (four::has_avx2()) return least_squares_avx2;
+  if (has_avx2()) return least_squares_avx2;
 #endif
   return least_squares_plain;
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "asperity/core/processor.h"
 #include "asperity/surface/detail/four.h"
 #include "asperity/surface/shell.h"
 
@@ -111,7 +112,7 @@ ASPERITY_FOUR void invert_wide(const ShellPrism& prism, const std::array<Lanes, 
 
 void ShellPrism::invert(const std::array<Lanes, 3>& points, ShellPlaces& places) const noexcept {
 #if defined(__x86_64__)
-  if (four::has_avx2()) return invert_by_avx2(*this, points, places);
+  if (has_avx2()) return invert_by_avx2(*this, points, places);
 #endif
   invert_wide(*this, points, places);
 }

@@ -346,14 +346,19 @@ double any_coordinate(Rng& rng) {
   return rng.below(4) == 0 ? special[rng.below(std::size(special))] : rng.uniform(-3.0, 3.0);
 }
 
-RC_GTEST_PROP(HeightMapLanes, SeveralAtOnceAreEachAsAloneToTheBit, ()) {
+/// Of any size, of one texel too, wrap and reconstruction, to be drawn within a property.
+HeightMap any_map(Rng& rng) {
   const int width = *rc::gen::inRange(1, 20);
   const int height = *rc::gen::inRange(1, 20);
   const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
   const Reconstruction reconstruction =
       *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
+  return map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+}
+
+RC_GTEST_PROP(HeightMapLanes, SeveralAtOnceAreEachAsAloneToTheBit, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
-  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  const HeightMap map = any_map(rng);
   for (int i = 0; i < 50; ++i) {
     // Mostly all within reach of a register, sometimes one that is not.
     const bool strange = rng.below(3) == 0;
@@ -370,13 +375,8 @@ RC_GTEST_PROP(HeightMapLanes, SeveralAtOnceAreEachAsAloneToTheBit, ()) {
 }
 
 RC_GTEST_PROP(HeightMapCurvature, HasTheHeightAndGradientOfSampleToTheBit, ()) {
-  const int width = *rc::gen::inRange(1, 20);
-  const int height = *rc::gen::inRange(1, 20);
-  const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
-  const Reconstruction reconstruction =
-      *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
-  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  const HeightMap map = any_map(rng);
   for (int i = 0; i < 50; ++i) {
     const Vec2 st(any_coordinate(rng), any_coordinate(rng));
     const HeightSample sample = map.sample(st);
@@ -388,19 +388,14 @@ RC_GTEST_PROP(HeightMapCurvature, HasTheHeightAndGradientOfSampleToTheBit, ()) {
 }
 
 RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) {
-  const int width = *rc::gen::inRange(1, 20);
-  const int height = *rc::gen::inRange(1, 20);
-  const Wrap wrap = *rc::gen::element(Wrap::repeat, Wrap::clamp);
-  const Reconstruction reconstruction =
-      *rc::gen::elementOf(std::vector<Reconstruction>(std::begin(all_reconstructions), std::end(all_reconstructions)));
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
-  const HeightMap map = map_of(random_heights(width, height, rng.next()), width, height, wrap, reconstruction);
+  const HeightMap map = any_map(rng);
   // Pieces of the quadratic spline meet on the texels' borders, those of the others at least on the lines through
   // centres.
-  const double piece = reconstruction == Reconstruction::quadratic_bspline ? 0.0 : 0.5;
+  const double piece = map.reconstruction() == Reconstruction::quadratic_bspline ? 0.0 : 0.5;
   // In a piece of the cubic one the mixed derivative is quadratic across: a short step leaves little of that.
-  const bool cubic = reconstruction == Reconstruction::bicubic;
-  const Vec2 step = Vec2(1.0 / width, 1.0 / height) * (cubic ? 1e-3 : 0.05);
+  const bool cubic = map.reconstruction() == Reconstruction::bicubic;
+  const Vec2 step = Vec2(1.0 / map.width(), 1.0 / map.height()) * (cubic ? 1e-3 : 0.05);
   const double left = cubic ? 1e-4 : 1e-9;
   for (int i = 0; i < 20; ++i) {
     const auto inside_a_piece = [&](int count) {
@@ -408,7 +403,7 @@ RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) 
       const double texel = std::floor(rng.uniform(-2.0 * count, 3.0 * count));
       return (texel + piece + (piece > 0.0 ? rng.uniform(0.06, 0.19) + half * 2.0 : rng.uniform(0.06, 0.94))) / count;
     };
-    const Vec2 st(inside_a_piece(width), inside_a_piece(height));
+    const Vec2 st(inside_a_piece(map.width()), inside_a_piece(map.height()));
     const Vec2 along_s =
         (map.sample(st + Vec2(step.x(), 0.0)).gradient - map.sample(st - Vec2(step.x(), 0.0)).gradient) /
         (2.0 * step.x());
@@ -417,10 +412,10 @@ RC_GTEST_PROP(HeightMapCurvature, AgreesWithFiniteDifferencesOfTheGradient, ()) 
         (2.0 * step.y());
     const HeightCurvature curvature = map.curvature(st);
     // Within a piece the gradient is at most quadratic along an axis, so the quotient is exact but for rounding.
-    RC_ASSERT(std::abs(curvature.ss - along_s.x()) <= left * 1e-3 * width * width);
-    RC_ASSERT(std::abs(curvature.st - along_s.y()) <= left * 1e-3 * width * height);
-    RC_ASSERT(std::abs(curvature.st - along_t.x()) <= left * 1e-3 * width * height);
-    RC_ASSERT(std::abs(curvature.tt - along_t.y()) <= left * 1e-3 * height * height);
+    RC_ASSERT(std::abs(curvature.ss - along_s.x()) <= left * 1e-3 * map.width() * map.width());
+    RC_ASSERT(std::abs(curvature.st - along_s.y()) <= left * 1e-3 * map.width() * map.height());
+    RC_ASSERT(std::abs(curvature.st - along_t.x()) <= left * 1e-3 * map.width() * map.height());
+    RC_ASSERT(std::abs(curvature.tt - along_t.y()) <= left * 1e-3 * map.height() * map.height());
   }
 }
 

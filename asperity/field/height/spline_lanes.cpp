@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "asperity/core/processor.h"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -15,11 +17,6 @@ namespace {
 // Without fused products, so that every bit is as in plain C++.
 #define ASPERITY_AVX2 __attribute__((target("avx2")))
 #define ASPERITY_AVX2_INLINE __attribute__((target("avx2"), always_inline)) inline
-
-bool has_avx2() noexcept {
-  static const bool supported = __builtin_cpu_supports("avx2");
-  return supported;
-}
 
 /// The texels under four coordinates: their indices, and the offsets from their middles.
 struct TexelsUnder {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "asperity/core/processor.h"
+
 #if defined(__x86_64__)
 #include <emmintrin.h>
 #endif
@@ -221,8 +223,7 @@ double least_of(const Lanes& x) {
 void measure_corners(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                      std::span<FaceCorners> corners) {
 #if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  const auto shape = wide ? shape_avx2 : shape_plain;
+  const auto shape = has_avx2() ? shape_avx2 : shape_plain;
 #else
   const auto shape = shape_plain;
 #endif
@@ -235,8 +236,7 @@ FaceMeasures measure_faces(std::span<const Vec3> positions, std::span<const Tria
   normals.resize(positions.size());
   Totals totals;
 #if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  const auto measure = wide ? measure_avx2 : measure_plain;
+  const auto measure = has_avx2() ? measure_avx2 : measure_plain;
 #else
   const auto measure = measure_plain;
 #endif

@@ -51,14 +51,4 @@ ASPERITY_FOUR void cross(const Vectors& a, const Vectors& b, Vectors& out) {
   out = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Whether this processor has AVX2. [any]
-inline bool has_avx2() noexcept {
-#if defined(__x86_64__)
-  static const bool wide = __builtin_cpu_supports("avx2");
-  return wide;
-#else
-  return false;
-#endif
-}
-
 }  // namespace asperity::four

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "asperity/core/parallel_for.h"
+#include "asperity/core/processor.h"
 #include "asperity/surface/relief/detail/bounds.h"
 #include "asperity/surface/relief/detail/carried.h"
 #include "asperity/surface/relief/detail/enclosed.h"
@@ -46,7 +47,7 @@ __attribute__((target("avx2"))) unsigned holds_four_avx2(const TriangleMesh& mes
 
 HoldsFour best_holds_four() noexcept {
 #if defined(__x86_64__)
-  if (four::has_avx2()) return holds_four_avx2;
+  if (has_avx2()) return holds_four_avx2;
 #endif
   return holds_four_plain;
 }
@@ -67,7 +68,7 @@ class ReliefSurface::EnclosedByFour {
   /// Writes their ranges and boxes.
   void run(const std::uint32_t (&faces)[4], Box* const (&boxes)[4]) const {
 #if defined(__x86_64__)
-    if (four::has_avx2()) return run_avx2(faces, boxes);
+    if (has_avx2()) return run_avx2(faces, boxes);
 #endif
     enclose(faces, boxes);
   }

@@ -104,8 +104,11 @@ class PatchRay {
     while (top > 0) {
       Piece piece = stack[--top];
       Share share;
+      ShellPlace bend;
+      const Way way = look_beside(piece, bend, share.bulge);
+      if (way == Way::off) continue;
       const bool strip = is_strip(piece, 1.0);
-      if (!strip && passed_over(piece, share)) continue;
+      if (!strip && way == Way::known && bounded_away(piece, bend, share)) continue;
       if (strip || is_strip(piece, share.to - share.from)) {
         if (solve_strip(piece, share, best)) return best;
         continue;
@@ -139,6 +142,10 @@ class PatchRay {
     Moment to;
     int level = 0;
   };
+
+  /// Where a piece of the curve goes: nowhere over the face or within its heights, somewhere there, or how it bends is
+  /// not known.
+  enum class Way { off, known, unknown };
 
   /// The part of a piece that may meet the relief, and by how much the curve is off its chord in the middle.
   struct Share {
@@ -204,25 +211,31 @@ class PatchRay {
     moment.value = moment.place.height - surface_.height_alone(frame(), moment.place.u, moment.place.v);
   }
 
-  /// Whether a piece of the curve is over the face nowhere, or on one side of the relief throughout. Where it is not,
-  /// `share` is the part of it that may be on both.
-  [[nodiscard]] bool passed_over(const Piece& piece, Share& share) const noexcept {
+  /// What is known of a piece without a look at its part of the relief, which is dear, as is the frame that it needs.
+  /// `bend` and `bulge` as bends_by finds them; only of what is known.
+  [[nodiscard]] Way look_beside(const Piece& piece, ShellPlace& bend, ShellPlace& bulge) const noexcept {
     if (!piece.from.reached || !piece.to.reached) {
       // Where the shell does not reach at either end of ever shorter pieces there is no relief.
       constexpr int patience = 4;
-      return !piece.from.reached && !piece.to.reached && piece.level >= patience;
+      return !piece.from.reached && !piece.to.reached && piece.level >= patience ? Way::off : Way::unknown;
     }
     const ShellPlace& a = piece.from.place;
     const ShellPlace& b = piece.to.place;
-    ShellPlace bend;
-    if (!bends_by(piece, bend, share.bulge)) return false;
+    if (!bends_by(piece, bend, bulge)) return Way::unknown;
     const double beside = overlap + std::max(bend.u, bend.v);
     if (std::max(a.u, b.u) < -beside || std::max(a.v, b.v) < -beside ||
         std::min(a.u + a.v, b.u + b.v) > 1.0 + 2.0 * beside)
-      return true;
-    // Over all that the face has anywhere, or below: a look at the part itself is dear.
-    if (std::min(a.height, b.height) - bend.height > range_.highest) return true;
-    if (std::max(a.height, b.height) + bend.height < range_.lowest - room_below(piece)) return true;
+      return Way::off;
+    const bool over = std::min(a.height, b.height) - bend.height > range_.highest;
+    const bool below = std::max(a.height, b.height) + bend.height < range_.lowest - room_below(piece);
+    return over || below ? Way::off : Way::known;
+  }
+
+  /// Whether a piece of the curve, bent by so much, is on one side of the relief throughout. Where it is not, `share`
+  /// is the part of it that may be on both.
+  [[nodiscard]] bool bounded_away(const Piece& piece, const ShellPlace& bend, Share& share) const noexcept {
+    const ShellPlace& a = piece.from.place;
+    const ShellPlace& b = piece.to.place;
     const FacePart part = FacePart::line({a.u, a.v}, {b.u, b.v}, {bend.u, bend.v});
     count_.bounds += surface_.bounds_of(frame(), part);
     const HeightForm form = surface_.form(frame(), part);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/core/processor.h"
+
 namespace asperity {
 
 namespace {
@@ -104,9 +106,8 @@ __attribute__((target("avx2"))) void bound_avx2(const std::array<const float*, 8
 __attribute__((target("avx2"))) float square_avx2(const float* places, const Vec3f& c, float* to) {
   return square_all(places, c, to);
 }
-const bool wide_lanes = __builtin_cpu_supports("avx2");
-const auto bound_blocks = wide_lanes ? bound_avx2 : bound_plain;
-const auto square_nodes = wide_lanes ? square_avx2 : square_plain;
+const auto bound_blocks = has_avx2() ? bound_avx2 : bound_plain;
+const auto square_nodes = has_avx2() ? square_avx2 : square_plain;
 #else
 const auto bound_blocks = bound_plain;
 const auto square_nodes = square_plain;
