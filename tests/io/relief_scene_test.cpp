@@ -182,6 +182,15 @@ TEST_F(ReliefScene, ClosingFillsAndSaysWhere) {
   EXPECT_GT(coat(levels).levels(), 1);
   EXPECT_GT(instance(levels).closed_from->closed.report.changed_texels, 0U);
   comes_back(levels);
+  const std::string moving =
+      R"(,"layers":[{"solid":"waves","amplitude":"0.1 mm","wavelength":"8 mm","direction":[1,0,0],"frequency":"2 Hz"}])";
+  const std::string soft =
+      R"(,"maps":{"stiffness":{"image":{"generator":"H_3","size":32},"low":"0.4 N/mm","high":"1 N/mm"}})";
+  const std::string closing = R"(,"closing":{"radius":"4 mm","texels":16})";
+  EXPECT_EQ(coat(good(scene(groove + moving))).layers().size(), 1U);
+  EXPECT_NE(coat(good(scene(groove + soft))).materials(), nullptr);
+  refused(scene(groove + moving + closing), "surfaces[0].coat.closing", "changes with time");
+  refused(scene(groove + soft + closing), "surfaces[0].coat.closing", "maps of the material");
 }
 
 TEST_F(ReliefScene, FilletsAreReadAndTheLiteralTestOfNeighbours) {
