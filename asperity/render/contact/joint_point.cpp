@@ -287,21 +287,34 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
                                           Vec3& proxy) noexcept {
   constexpr double most_grains = 4.0;
   Vec3 step = projection.point - proxy;
-  PlaneSet walls;
-  FixedVector<std::size_t, 3> holding;
+  bool whole = true;
   for (const PlaneProjection::Active& active : projection.active) {
-    if (active.plane >= held_.size()) {
-      walls.push_back(planes[active.plane]);
-      continue;
-    }
-    holding.push_back(active.plane);
+    if (active.plane >= held_.size()) continue;
     const double most = most_grains * entries_[held_[active.plane].owner].grain;
-    if (step.norm() > most) step *= most / step.norm();
+    if (step.norm() <= most) continue;
+    step *= most / step.norm();
+    whole = false;
   }
+  FixedVector<std::size_t, 3> holding;
+  PlaneSet walls;
+  PlaneSet also;  // walls that it met where it stands
   const auto holds = [&](std::size_t which) {
     return std::find(holding.begin(), holding.end(), which) != holding.end();
   };
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    // What it does not touch yet it comes to at the end of the way, not on a part of it.
+    holding.clear();
+    walls = also;
+    for (const PlaneProjection::Active& active : projection.active) {
+      const ConstraintPlane& plane = planes[active.plane];
+      const double above = plane.normal.dot(proxy) - plane.offset - plane.skin;
+      if (!whole && above > 2.0 * margin()) continue;
+      if (active.plane < held_.size()) {
+        holding.push_back(active.plane);
+      } else if (!stands_among(plane, also)) {
+        walls.push_back(plane);
+      }
+    }
     HeldSet after = held_;
     HeldSet from;
     for (const std::size_t which : holding) from.push_back(held_[which]);
@@ -327,11 +340,17 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
         remember(wall);
         return Move::learned;
       }
+      whole = false;
+      if (met.t * step.norm() <= tolerance_ && !stands_among(wall, walls)) {
+        also.push_back(wall);
+        continue;
+      }
       step *= std::max(0.0, met.t - 1e-3);
       if (step.norm() <= tolerance_) break;
       continue;
     }
     step *= 0.35;
+    whole = false;
     if (step.norm() <= tolerance_) break;
   }
   return Move::none;
