@@ -84,6 +84,7 @@ class JointSolve {
                   std::uint32_t work = Goal::no_limit) const noexcept;
   [[nodiscard]] ConstraintPlane plane_at(const Held& held) const noexcept;
   void planes_at(const Vec3& position, PlaneSet& out) noexcept;
+  [[nodiscard]] Vec3 off(const HeldSet& on, std::size_t owner, const Vec3& position) const noexcept;
   [[nodiscard]] Met first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept;
   std::size_t hold_to(const Met& met) noexcept;
   [[nodiscard]] bool onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexcept;

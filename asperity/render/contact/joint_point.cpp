@@ -133,6 +133,20 @@ void JointSolve::planes_at(const Vec3& position, PlaneSet& out) noexcept {
   }
 }
 
+/// A place that is on some folds of one surface, a skin off them.
+Vec3 JointSolve::off(const HeldSet& on, std::size_t owner, const Vec3& position) const noexcept {
+  constexpr double most_skins = 16.0;
+  const double skin = entries_[owner].skin;
+  PlaneSet planes;
+  for (const Held& held : on) {
+    if (held.owner == owner) planes.push_back({held.normal, held.normal.dot(position) + skin, 0.0, held.owner, {}});
+  }
+  Vec3 away = position;
+  // Between folds that all but meet there is no such place near.
+  if (onto_all(planes, away) && (away - position).norm() <= most_skins * skin) return away;
+  return position + skin * planes[0].normal;
+}
+
 /// What a point meets first on its way; of the surfaces that it goes along (`from`, and where on them it comes to, in
 /// the same order) only what overlaps them.
 JointSolve::Met JointSolve::first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept {
@@ -144,15 +158,19 @@ JointSolve::Met JointSolve::first_met(const Segment& motion, const HeldSet& from
     const Sides sides = touch.facts->sides;
     Segment local = touch.to_local(motion);
     SweptHit hit;
-    bool along = false;
-    for (std::size_t k = 0; k < from.size(); ++k) {
-      if (from[k].owner != i) continue;
-      along = true;
+    const bool along = std::any_of(from.begin(), from.end(), [&](const Held& held) { return held.owner == i; });
+    if (along) {
       const auto* relief = std::get_if<ReliefView>(&touch.view);
       if (relief == nullptr || !relief->overlaps()) continue;
-      const ReliefPoint start = relief->at(from[k].place);
-      const SweptHit fold = relief->between(from[k].place, start, to[k].place, relief->at(to[k].place), sides);
-      if (fold.hit && (!hit.hit || fold.t < hit.t)) hit = fold;
+      // The folds that it keeps to are held anyway, however they bend between the two places.
+      FixedVector<std::uint32_t, 2 * HeldSet::capacity()> faces;
+      for (std::size_t k = 0; k < from.size(); ++k) {
+        if (from[k].owner != i) continue;
+        faces.push_back(from[k].place.element);
+        faces.push_back(to[k].place.element);
+      }
+      const Segment moved{off(from, i, motion.from), off(to, i, motion.to)};
+      hit = relief->beside({faces.begin(), faces.end()}, touch.to_local(moved), sides);
     }
     if (!entry.smooth) {
       hit = std::get_if<TriangleView>(&touch.view)->sweep(local, margin(), sides);
@@ -334,16 +352,24 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
         proxy = next;
         return Move::nearer;
       }
-      if (entries_[met.owner].smooth) return hold_to(met) < held_.size() ? Move::learned : Move::none;
-      const ConstraintPlane wall = plane_of(met.owner, met.what.contact);
-      if (!stands_among(wall, planes)) {
-        remember(wall);
-        return Move::learned;
-      }
       whole = false;
-      if (met.t * step.norm() <= tolerance_ && !stands_among(wall, walls)) {
-        also.push_back(wall);
-        continue;
+      if (entries_[met.owner].smooth) {
+        const HeldSet before = held_;
+        const std::size_t known = hold_to(met);
+        if (known == held_.size()) return Move::none;
+        if (!holds(known)) return Move::learned;
+        // It keeps to that already: no farther than there.
+        held_ = before;
+      } else {
+        const ConstraintPlane wall = plane_of(met.owner, met.what.contact);
+        if (!stands_among(wall, planes)) {
+          remember(wall);
+          return Move::learned;
+        }
+        if (met.t * step.norm() <= tolerance_ && !stands_among(wall, walls)) {
+          also.push_back(wall);
+          continue;
+        }
       }
       step *= std::max(0.0, met.t - 1e-3);
       if (step.norm() <= tolerance_) break;
@@ -389,6 +415,8 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
   constexpr int most_moves = 64;
   constexpr int most_idle = 2;
   constexpr double short_slide = 0.1;  // of what it was to go
+  // What it comes nearer by less in a move waits for the next tick.
+  constexpr double worth_going_on = 0.1;  // of the tolerance
   if (!attached_) attach(solution.proxy);
   Vec3& proxy = solution.proxy;
   PlaneSet& planes = solution.planes;
@@ -425,7 +453,7 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
       }
     }
     release(proxy);
-    if (nearer(proxy, before, goal)) {
+    if ((before - goal).norm() - (proxy - goal).norm() > worth_going_on * tolerance_) {
       idle = learned = 0;
       feet_.clear();
     } else if (++idle == most_idle) {

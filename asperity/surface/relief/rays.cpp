@@ -593,14 +593,13 @@ SweptHit ReliefView::first_touch(const Segment& motion, Sides sides) const noexc
   return first_met(motion, sides, [](std::uint32_t) { return false; });
 }
 
-SweptHit ReliefView::between(const Place& from, const ReliefPoint& start, const Place& to, const ReliefPoint& end,
-                             Sides sides) const noexcept {
-  if (!surface_->overlapped(from.element) && !surface_->overlapped(to.element)) return {};
-  const Segment moved{start.point + from.side() * skin() * start.front, end.point + skin() * (to.side() * end.front)};
+SweptHit ReliefView::beside(std::span<const std::uint32_t> along, const Segment& moved, Sides sides) const noexcept {
+  if (std::none_of(along.begin(), along.end(), [&](std::uint32_t face) { return surface_->overlapped(face); }))
+    return {};
   const auto triangles = surface_->base().mesh().triangles();
   return first_met(moved, sides, [&](std::uint32_t face) {
-    return share_vertex(triangles[face], triangles[from.element]) ||
-           share_vertex(triangles[face], triangles[to.element]);
+    return std::any_of(along.begin(), along.end(),
+                       [&](std::uint32_t other) { return share_vertex(triangles[face], triangles[other]); });
   });
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 // A relief as one tick touches it, and walks along it.
 
+#include <span>
+
 #include "asperity/surface/relief/surface.h"
 
 namespace asperity {
@@ -24,7 +26,13 @@ class ReliefView {
   /// what belongs to the faces of the two, or shares a vertex with one of them, is not met.
   [[nodiscard]] bool overlaps() const noexcept { return surface_->overlaps(); }
   [[nodiscard]] SweptHit between(const Place& from, const ReliefPoint& start, const Place& to, const ReliefPoint& end,
-                                 Sides sides) const noexcept;
+                                 Sides sides) const noexcept {
+    const std::uint32_t along[] = {from.element, to.element};
+    return beside(
+        along, {start.point + from.side() * skin() * start.front, end.point + skin() * (to.side() * end.front)}, sides);
+  }
+  /// The same for a point that keeps to several folds, among them these faces, and is moved a skin off them.
+  [[nodiscard]] SweptHit beside(std::span<const std::uint32_t> along, const Segment& moved, Sides sides) const noexcept;
   /// Of the displaced surface. `normal` is that of the surface, turned towards p.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
   [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
