@@ -163,6 +163,7 @@ template <class FrictionOf>
 ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
                                                    const FrictionOf& friction_of) noexcept {
   constexpr int most_rounds = 4;
+  constexpr int most_parts = 3;
   ConstraintSolution solution;
   Vec3 proxy = from;
   PlaneSet planes;
@@ -189,9 +190,18 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
     }
     bool slipped = !holds(hold.friction, proxy, hold.normal, probe, sliding);
     if (slipped) {
-      goal = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
-      solution = solve(proxy, goal);
-      slipped = no_farther(solution.proxy, proxy, probe);
+      const Vec3 aim = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
+      // On a bent surface the cone turns on the way: where all of it leads away from the probe, a part of it may not.
+      const Vec3 still = proxy - (proxy - aim).dot(hold.normal) * hold.normal;
+      const HeldSet held = held_;
+      double share = 1.0;
+      slipped = false;
+      for (int part = 0; part < most_parts && !slipped && !work_.spent(); ++part, share *= 0.25) {
+        goal = still + share * (aim - still);
+        solution = solve(proxy, goal);
+        slipped = no_farther(solution.proxy, proxy, probe);
+        if (!slipped) held_ = held;
+      }
     }
     if (!slipped) {
       sliding = sliding || (slid && !landed);

@@ -22,24 +22,6 @@ bool nearer(const Vec3& now, const Vec3& before, const Vec3& goal) noexcept {
   return (now - goal).squaredNorm() < (before - goal).squaredNorm() * (1.0 - least_gain);
 }
 
-/// The point nearest to `p` on all of up to three planes. False where they all but agree in direction.
-bool onto_all(const PlaneSet& planes, Vec3& p) noexcept {
-  constexpr double least_angle = 1e-3;
-  // One after another, each along what the ones before leave free.
-  FixedVector<Vec3, 3> across;
-  for (const ConstraintPlane& plane : planes) {
-    Vec3 way = plane.normal;
-    for (const Vec3& other : across) way -= way.dot(other) * other;
-    const double length = way.norm();
-    if (!(length > least_angle) || across.size() == across.capacity()) return false;
-    way /= length;
-    // The earlier planes stay as they are: `way` lies in all of them.
-    p += (plane.offset + plane.skin - plane.normal.dot(p)) / length * way;
-    across.push_back(way);
-  }
-  return true;
-}
-
 }  // namespace
 
 /// Whether a point is where a place is. Walks find that to within a share of the grain, along the surface.
@@ -133,17 +115,22 @@ void JointSolve::planes_at(const Vec3& position, PlaneSet& out) noexcept {
   }
 }
 
-/// A place that is on some folds of one surface, a skin off them.
+/// A place that is on some folds of one surface, a skin off them, and off the others that it touches.
 Vec3 JointSolve::off(const HeldSet& on, std::size_t owner, const Vec3& position) const noexcept {
   constexpr double most_skins = 16.0;
   const double skin = entries_[owner].skin;
   PlaneSet planes;
   for (const Held& held : on) {
-    if (held.owner == owner) planes.push_back({held.normal, held.normal.dot(position) + skin, 0.0, held.owner, {}});
+    if (held.owner == owner) planes.push_back({held.normal, held.normal.dot(position), skin, held.owner, {}});
   }
-  Vec3 away = position;
+  for (const Held& held : held_) {
+    const double above = held.normal.dot(position - held.point);
+    if (held.owner == owner && above < skin && touches(held, position))
+      planes.push_back({held.normal, held.normal.dot(position), skin, held.owner, {}});
+  }
+  const PlaneProjection away = project_onto_planes(position, planes, true);
   // Between folds that all but meet there is no such place near.
-  if (onto_all(planes, away) && (away - position).norm() <= most_skins * skin) return away;
+  if (away.feasible && (away.point - position).norm() <= most_skins * skin) return away.point;
   return position + skin * planes[0].normal;
 }
 

@@ -138,4 +138,21 @@ PlaneProjection project_onto_planes(const Vec3& goal, const PlaneSet& planes, bo
   return ActiveSet(goal, planes, with_skin).solve();
 }
 
+bool onto_all(const PlaneSet& planes, Vec3& p) noexcept {
+  constexpr double least_angle = 1e-3;
+  // One after another, each along what the ones before leave free.
+  FixedVector<Vec3, 3> across;
+  for (const ConstraintPlane& plane : planes) {
+    Vec3 way = plane.normal;
+    for (const Vec3& other : across) way -= way.dot(other) * other;
+    const double length = way.norm();
+    if (!(length > least_angle) || across.size() == across.capacity()) return false;
+    way /= length;
+    // The earlier planes stay as they are: `way` lies in all of them.
+    p += (plane.offset + plane.skin - plane.normal.dot(p)) / length * way;
+    across.push_back(way);
+  }
+  return true;
+}
+
 }  // namespace asperity

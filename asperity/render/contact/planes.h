@@ -50,6 +50,10 @@ inline Vec3 onto_plane(const Vec3& goal, const ConstraintPlane& plane) noexcept 
   return goal + std::max(0.0, plane.offset + plane.skin - plane.normal.dot(goal)) * plane.normal;
 }
 
+/// Moves `p` to the point nearest to it that lies on all of up to three planes, each with its skin. False, and `p`
+/// anywhere, where they all but agree in direction. [servo]
+bool onto_all(const PlaneSet& planes, Vec3& p) noexcept;
+
 /// Where the proxy rests, and what holds it there.
 struct ConstraintSolution {
   Vec3 proxy = Vec3::Zero();   ///< m, one skin above what it touches

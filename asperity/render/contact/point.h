@@ -1,6 +1,8 @@
 #pragma once
 // The proxy law where a point touches one surface: the servo loop's fast path, once for every kind of surface.
 
+#include <optional>
+
 #include "asperity/render/contact/coulomb.h"
 #include "asperity/render/contact/planes.h"
 #include "asperity/render/state.h"
@@ -66,8 +68,6 @@ class PointProxy {
   static constexpr int most_walk = 1024;
   /// Moves between overlapping folds that one tick may take, over all of its flights.
   static constexpr int most_moves_of_tick = 128;
-  /// Evaluations of one way along a crease.
-  static constexpr int short_walk = 72;
   static constexpr bool may_overlap = requires(const View& v) { v.overlaps(); };
   static constexpr bool on_triangles = requires(const View& v, const Place& p) { v.within_face(p); };
 
@@ -103,8 +103,12 @@ class PointProxy {
     return false;
   }
 
+  [[nodiscard]] static Place place_of(const SweptHit& hit) noexcept {
+    return {hit.contact.element, hit.side < 0.0, hit.contact.at};
+  }
+
   void take(const SweptHit& hit) noexcept {
-    place_ = {hit.contact.element, hit.side < 0.0, hit.contact.at};
+    place_ = place_of(hit);
     spot_ = view_.at(place_, hit.side * hit.contact.normal);
   }
 
@@ -128,7 +132,7 @@ class PointProxy {
     if constexpr (may_overlap) {
       // In a crease it is pushed along what draws it.
       if (!flanks_.empty() && spot_.point != probe_) state_.normal = (spot_.point - probe_).normalized();
-      for (const Flank& flank : flanks_) state_.places.push_back(flank.place);
+      for (const Fold& flank : flanks_) state_.places.push_back(flank.place);
     }
     return {true, true, converged, false, spot_.point, state_.normal};
   }
@@ -141,12 +145,13 @@ class PointProxy {
     return settle_on_fold();
   }
 
-  /// Another fold that the proxy touches beside the one that it is on: its place nearest to it.
-  struct Flank {
+  /// A fold that the proxy touches: its place nearest to it.
+  struct Fold {
     Place place;
     Spot spot;
     [[nodiscard]] Vec3 normal() const noexcept { return place.side() * spot.front; }
   };
+  using Folds = FixedVector<Fold, 3>;
 
   /// From one fold to another that overlaps it in space; where the probe draws it into both, along the crease between
   /// them. Each move comes nearer.
@@ -155,20 +160,50 @@ class PointProxy {
   /// What the last tick left it beside.
   void recall_flanks() noexcept;
 
+  /// How far from a fold it touches it, as walks find that (m).
+  [[nodiscard]] double room_beside() const noexcept {
+    constexpr double skins = 8.0;
+    constexpr double of_grain = 4e-3;
+    return skins * view_.skin() + of_grain * view_.grain();
+  }
+  [[nodiscard]] bool touches(const Fold& flank) const noexcept;
+
   /// Takes a flank for the fold that it is on. False, and nothing done, where that is farther.
   bool lead_with(std::size_t index) noexcept;
+  void lead_by(const Fold& fold) noexcept {
+    place_ = fold.place;
+    spot_ = fold.spot;
+  }
 
   /// Where the probe leads it along a crease: to the nearest point of the tangent planes, less what friction holds.
   Vec3 along_crease(const PlaneProjection& held) noexcept;
+
+  /// Leads up to three folds to where they all meet near a point, as near to it as they can: Newton's steps on their
+  /// tangent planes.
+  [[nodiscard]] bool onto(Folds& folds, Vec3 point) noexcept;
+
+  [[nodiscard]] Folds all_folds() const noexcept;
+
+  /// Where all of some folds are, a skin off them.
+  [[nodiscard]] Vec3 off(const Folds& folds) const noexcept;
+
+  /// Moves along a crease that are not worth making (m).
+  [[nodiscard]] double rest_along_crease() const noexcept {
+    constexpr double of_grain = 2e-3;
+    return std::max(view_.skin(), of_grain * view_.grain());
+  }
+
+  /// What it comes nearer by less in a move waits for the next tick (m).
+  [[nodiscard]] double worth_going_on() const noexcept { return 0.1 * rest_along_crease(); }
 
   /// A flank's place nearest to where it is.
   [[nodiscard]] Goal beside() const noexcept {
     return {.point = spot_.point, .may_leave = false, .work = work_.left()};
   }
 
-  [[nodiscard]] bool nearer(const Spot& before) const noexcept {
+  [[nodiscard]] bool nearer(const Spot& spot, const Spot& before) const noexcept {
     constexpr double least_gain = 1e-9;
-    return (spot_.point - probe_).squaredNorm() < (before.point - probe_).squaredNorm() * (1.0 - least_gain);
+    return (spot.point - probe_).squaredNorm() < (before.point - probe_).squaredNorm() * (1.0 - least_gain);
   }
 
   /// What was on the way of a move along a fold.
@@ -177,12 +212,29 @@ class PointProxy {
     on,     ///< another fold: it goes on from there, on that one and beside the one that it was on
     stuck,  ///< another fold, no nearer: it is where it was
   };
-  /// Along a crease; `stuck` where that comes no nearer.
-  Way go_along(const Vec3& step) noexcept;
+  /// Along a crease of what holds it, or a part of the step; `stuck` where that comes no nearer.
+  Way go_along(const PlaneProjection& held, const Vec3& step) noexcept;
+  /// A place on the crease of some folds so far on, or less far, that is nearer. False where none is found.
+  bool search_along(const Folds& from, Vec3 step, Folds& on) noexcept;
+  /// At the foot of an edge both of its sides hold it.
+  bool learn_kink() noexcept;
+  /// Of these it is beside those that it touches.
+  void stay_beside(Folds& folds) noexcept;
 
-  /// In legs, so that what is in the way is seen before much has been walked in vain.
-  template <class Lead>
-  Way go(DescentEnd& end, const Lead& lead, int most = most_walk) noexcept;
+  /// Along one fold, in legs, so that what is in the way is seen before much has been walked in vain.
+  Way go(DescentEnd& end) noexcept;
+  /// On from where it has met another fold where it stands.
+  Way stand_beside(const Fold& met) noexcept;
+  /// Whether two are one, from whichever side.
+  [[nodiscard]] bool is_same(const Fold& one, const Fold& other) const noexcept {
+    constexpr double same_direction = 0.999;
+    return std::abs(one.normal().dot(other.normal())) >= same_direction &&
+           (one.spot.point - other.spot.point).norm() <= room_beside();
+  }
+  /// The flank that is the same, or how many there are.
+  [[nodiscard]] std::size_t same_as(const Fold& met) const noexcept;
+  /// Takes it for a flank; false where it is known, or enough has been learned.
+  bool learn(const Fold& met) noexcept;
 
   [[gnu::always_inline]] inline DescentEnd settle_on_fold(int moves = most_walk) noexcept {
     if (friction_.still <= 0.0) return slide(0.0, moves);
@@ -211,10 +263,13 @@ class PointProxy {
   const WorkMeter& work_;
   Place place_;
   Spot spot_;
-  FixedVector<Flank, 2> flanks_;
-  int moves_ = 0;              ///< between overlapping folds
-  int in_vain_ = 0;            ///< flights that came hardly nearer
-  double left_at_ = infinity;  ///< distance from the probe where it flew off last
+  FixedVector<Fold, 2> flanks_;  ///< the others
+  std::optional<Fold> kink_;     ///< where one of them had turned to over an edge when they were last led to a point
+  bool kink_rises_ = false;      ///< over where it had been
+  int moves_ = 0;                ///< between overlapping folds
+  int learned_ = 0;              ///< folds found where it stands
+  int in_vain_ = 0;              ///< flights that came hardly nearer
+  double left_at_ = infinity;    ///< distance from the probe where it flew off last
 };
 
 }  // namespace asperity

@@ -555,14 +555,14 @@ class PatchRay {
 }  // namespace
 
 template <class Skip>
-SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept {
+SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& skip,
+                               std::uint32_t likely) const noexcept {
   SweptHit best;
   const Vec3 way = motion.to - motion.from;
   if (!(way.squaredNorm() > 0.0)) return best;
   ReliefPlace place;
   WorkCount count;
-  // Nearly all motions are far shorter than a face: the neighbourhood decides.
-  surface_->base().index().for_each_along(motion, surface_->boxes(), [&](std::uint32_t face) {
+  const auto look_at = [&](std::uint32_t face) {
     if (skip(face)) return best.t;
     HullPart part;
     const ShellPrism prism = surface_->shell().prism(surface_->base().mesh(), face);
@@ -577,7 +577,11 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
       if (place.u + place.v > 1.0) place.v = 1.0 - place.u;
     }
     return best.t;
-  });
+  };
+  if (likely != no_index) look_at(likely);
+  // Nearly all motions are far shorter than a face: the neighbourhood decides.
+  surface_->base().index().for_each_along(motion, surface_->boxes(),
+                                          [&](std::uint32_t face) { return face == likely ? best.t : look_at(face); });
   tell(cache_->work, count);
   if (!best.hit) return best;
   const ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
@@ -593,14 +597,16 @@ SweptHit ReliefView::first_touch(const Segment& motion, Sides sides) const noexc
   return first_met(motion, sides, [](std::uint32_t) { return false; });
 }
 
-SweptHit ReliefView::beside(std::span<const std::uint32_t> along, const Segment& moved, Sides sides) const noexcept {
-  if (std::none_of(along.begin(), along.end(), [&](std::uint32_t face) { return surface_->overlapped(face); }))
+SweptHit ReliefView::beside(std::span<const std::uint32_t> faces, const Segment& moved, Sides sides,
+                            std::uint32_t likely) const noexcept {
+  if (std::none_of(faces.begin(), faces.end(), [&](std::uint32_t face) { return surface_->overlapped(face); }))
     return {};
   const auto triangles = surface_->base().mesh().triangles();
-  return first_met(moved, sides, [&](std::uint32_t face) {
-    return std::any_of(along.begin(), along.end(),
+  const auto skip = [&](std::uint32_t face) {
+    return std::any_of(faces.begin(), faces.end(),
                        [&](std::uint32_t other) { return share_vertex(triangles[face], triangles[other]); });
-  });
+  };
+  return first_met(moved, sides, skip, likely);
 }
 
 }  // namespace asperity

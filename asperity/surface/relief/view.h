@@ -22,17 +22,12 @@ class ReliefView {
 
   /// No relief, however thin, is stepped over.
   [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
-  /// Whether folds overlap in space; and then what a point meets that slides from one place to another, of the rest:
-  /// what belongs to the faces of the two, or shares a vertex with one of them, is not met.
+  /// Whether folds overlap in space; and then what a point meets that keeps to some of them, from places on these faces
+  /// to others, moved a skin off them: of the rest, for what belongs to the faces, or shares a vertex with one of them,
+  /// is not met. `likely`: what it may meet at once, if anything is known of that; looked at first.
   [[nodiscard]] bool overlaps() const noexcept { return surface_->overlaps(); }
-  [[nodiscard]] SweptHit between(const Place& from, const ReliefPoint& start, const Place& to, const ReliefPoint& end,
-                                 Sides sides) const noexcept {
-    const std::uint32_t along[] = {from.element, to.element};
-    return beside(
-        along, {start.point + from.side() * skin() * start.front, end.point + skin() * (to.side() * end.front)}, sides);
-  }
-  /// The same for a point that keeps to several folds, among them these faces, and is moved a skin off them.
-  [[nodiscard]] SweptHit beside(std::span<const std::uint32_t> along, const Segment& moved, Sides sides) const noexcept;
+  [[nodiscard]] SweptHit beside(std::span<const std::uint32_t> faces, const Segment& moved, Sides sides,
+                                std::uint32_t likely = no_index) const noexcept;
   /// Of the displaced surface. `normal` is that of the surface, turned towards p.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
   [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
@@ -91,7 +86,8 @@ class ReliefView {
   /// Unit direction that leads off a place, on its side, and away from all faces around it.
   [[nodiscard]] Vec3 way_off(const Place& place, const ReliefPoint& spot) const noexcept;
   template <class Skip>
-  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip) const noexcept;
+  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip,
+                                   std::uint32_t likely = no_index) const noexcept;
 
   const ReliefSurface* surface_;
   CoatMoment moment_;
