@@ -157,6 +157,37 @@ inline Body relief(Rng& rng) {
           0.5 * side};
 }
 
+/// Two such squares that cross, as one relief: what is under either is inside, and they hold a point along the crease
+/// that they make.
+inline Body folds(Rng& rng) {
+  const double waves = std::floor(rng.uniform(6.0, 30.0));
+  const double side = 0.06;
+  const double amplitude = rng.uniform(0.02, 0.06) * side / waves;
+  const double turn = 2.0 * std::numbers::pi * waves / side;
+  const auto height = [=](double x, double y) {
+    return amplitude * 0.5 * (std::sin(turn * x) + std::cos(turn * y) * std::cos(turn * x));
+  };
+  Pose other;
+  other.orientation = Quat(Eigen::AngleAxisd(rng.uniform(0.7, 2.4), Vec3::UnitX()) *
+                           Eigen::AngleAxisd(rng.uniform(0.0, 6.0), Vec3::UnitZ()));
+  other.position = Vec3(0.7e-3, 0.4e-3, 0.0);  // no vertex of one on one of the other
+  MeshSource source = plane_grid(side, side, 12, 12);
+  const MeshSource flat = source;
+  for (const Vec3& p : flat.positions) source.positions.push_back(other.apply(p));
+  const auto first = static_cast<std::uint32_t>(flat.positions.size());
+  for (const auto& t : flat.triangles) source.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  source.corner_uvs.insert(source.corner_uvs.end(), flat.corner_uvs.begin(), flat.corner_uvs.end());
+  auto map = test::map_of(512, [&](double s, double t) { return height((s - 0.5) * side, (t - 0.5) * side); });
+  return {instance_of(test::coated(std::move(source), std::move(map), Mapping::uv, side)),
+          [one = sheet_distance(height, 3e-3), other](const Vec3& p) {
+            return std::min(one(p), one(other.apply_inverse(p)));
+          },
+          0.01,
+          3e-6,
+          "folds",
+          0.5 * side};
+}
+
 inline Body iso(Rng& rng) {
   const double radius = rng.uniform(0.005, 0.015);
   const double half = 1.3 * radius;

@@ -168,8 +168,8 @@ class PointProxy {
   }
   [[nodiscard]] bool touches(const Fold& flank) const noexcept;
 
-  /// Takes a flank for the fold that it is on. False, and nothing done, where that is farther.
-  bool lead_with(std::size_t index) noexcept;
+  /// Takes a flank for the fold that it is on.
+  void lead_with(std::size_t index) noexcept;
   void lead_by(const Fold& fold) noexcept {
     place_ = fold.place;
     spot_ = fold.spot;

@@ -22,11 +22,18 @@ DescentEnd PointProxy<View>::settle_over_folds() noexcept {
     for (const Fold& flank : flanks_) planes.push_back(plane_through(flank.spot.point, flank.normal()));
     const PlaneProjection held = project_onto_planes(probe_, planes, false);
     if (held.active.size() < 2) {
-      if (!held.active.empty() && held.active[0].plane > 0 && !lead_with(held.active[0].plane - 1))
-        return DescentEnd::rest;
+      const Fold before{place_, spot_};
+      const auto flanks = flanks_;
+      if (!held.active.empty() && held.active[0].plane > 0) lead_with(held.active[0].plane - 1);
       DescentEnd end = DescentEnd::rest;
       const Way way = go(end);
       if (way == Way::on) continue;
+      // The flank that it leads with may be a hair's breadth farther.
+      if (!no_farther(spot_.point, before.spot.point, probe_)) {
+        lead_by(before);
+        flanks_ = flanks;
+        return DescentEnd::rest;
+      }
       return way == Way::free ? end : DescentEnd::rest;
     }
     Vec3 way = along_crease(held) - spot_.point;
@@ -64,12 +71,18 @@ bool PointProxy<View>::touches(const Fold& flank) const noexcept {
 }
 
 template <SurfaceView View>
-bool PointProxy<View>::lead_with(std::size_t index) noexcept {
-  const Fold flank = flanks_[index];
-  if (!no_farther(flank.spot.point, spot_.point, probe_)) return false;
-  flanks_[index] = {place_, spot_};
-  lead_by(flank);
-  return true;
+void PointProxy<View>::lead_with(std::size_t index) noexcept {
+  Folds both;
+  both.push_back(flanks_[index]);
+  both.push_back({place_, spot_});
+  // Where both are, or else it may begin inside of the other.
+  if ((flanks_[index].spot.point - spot_.point).norm() > view_.skin() && !onto(both, spot_.point)) {
+    both.clear();
+    both.push_back(flanks_[index]);
+    both.push_back({place_, spot_});
+  }
+  lead_by(both[0]);
+  flanks_[index] = both[1];
 }
 
 template <SurfaceView View>
@@ -130,12 +143,12 @@ Vec3 PointProxy<View>::off(const Folds& folds) const noexcept {
   const Vec3& on = folds[0].spot.point;
   PlaneSet planes;
   for (const Fold& fold : folds) {
-    planes.push_back(plane_through(on, fold.normal()));
+    planes.push_back(plane_through(fold.spot.point, fold.normal()));
     planes[planes.size() - 1].skin = view_.skin();
   }
   const PlaneProjection away = project_onto_planes(on, planes, true);
   // Between folds that all but meet there is no such place near.
-  if (away.feasible && (away.point - on).norm() <= most_skins * view_.skin()) return away.point;
+  if (away.feasible && (away.point - on).norm() <= most_skins * view_.skin() + room_beside()) return away.point;
   return on + view_.skin() * folds[0].normal();
 }
 
@@ -266,8 +279,8 @@ auto PointProxy<View>::go(DescentEnd& end) noexcept -> Way {
   flanks_.clear();
   take(hit);
   view_.descend(left.place, left.spot, beside());
-  // The way went under what the fold bulges by: to where the two meet.
-  if (left.normal().dot(spot_.point - left.spot.point) < -view_.skin()) {
+  // The way is a chord of the fold, over it or under it: to where the two meet.
+  if (std::abs(left.normal().dot(spot_.point - left.spot.point)) > view_.skin()) {
     Folds both;
     both.push_back({place_, spot_});
     both.push_back(left);
