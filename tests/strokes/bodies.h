@@ -26,6 +26,7 @@ struct Body {
   double error = 0.0;  ///< m, between what is felt and what `distance` tells
   std::string name;
   double rim = infinity;  ///< m, of a sheet: beyond that from its middle, sideways, `distance` is of what is not there
+  std::vector<Distance> sheets{};  ///< what it consists of, if of several
 };
 
 /// Distance to one triangle, by its planes, edges and corners in turn.
@@ -185,7 +186,9 @@ inline Body folds(Rng& rng) {
           0.01,
           3e-6,
           "folds",
-          0.5 * side};
+          0.5 * side,
+          {sheet_distance(height, 3e-3),
+           [one = sheet_distance(height, 3e-3), other](const Vec3& p) { return one(other.apply_inverse(p)); }}};
 }
 
 inline Body iso(Rng& rng) {
@@ -231,7 +234,11 @@ inline const std::vector<Maker>& makers() {
 /// The body somewhere else.
 inline Body placed(Body body, const Pose& pose) {
   body.instance.world_from_object = pose;
-  body.distance = [own = std::move(body.distance), pose](const Vec3& p) { return own(pose.apply_inverse(p)); };
+  const auto moved = [&pose](Distance own) -> Distance {
+    return [own = std::move(own), pose](const Vec3& p) { return own(pose.apply_inverse(p)); };
+  };
+  body.distance = moved(std::move(body.distance));
+  for (Distance& sheet : body.sheets) sheet = moved(std::move(sheet));
   return body;
 }
 

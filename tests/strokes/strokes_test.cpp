@@ -141,13 +141,18 @@ class Bodies {
   }
   /// Whether friction may hold a tip at `p`: between several bodies it may, on one of them within its cone.
   [[nodiscard]] bool may_stick(const Vec3& p, const Vec3& goal, double coefficient) const {
+    constexpr double touching = 50e-6;
     const Body* only = nullptr;
     for (const Body& body : bodies_) {
-      if (body.distance(p) - radius_ > 50e-6) continue;
+      if (body.distance(p) - radius_ > touching) continue;
       if (only != nullptr) return true;
       only = &body;
     }
     if (only == nullptr) return false;
+    const auto& sheets = only->sheets;
+    if (!sheets.empty() &&
+        std::all_of(sheets.begin(), sheets.end(), [&](const Distance& d) { return d(p) - radius_ <= touching; }))
+      return true;
     const Vec3 normal = slope(*only, p);
     const double push = (p - goal).dot(normal);
     return (p - goal - push * normal).norm() <= 1.5 * coefficient * push;

@@ -130,8 +130,9 @@ class PointProxy {
     state_.places.push_back(place_);
     state_.normal = normal();
     if constexpr (may_overlap) {
-      // In a crease it is pushed along what draws it.
-      if (!flanks_.empty() && spot_.point != probe_) state_.normal = (spot_.point - probe_).normalized();
+      // In a crease it is pushed along what draws it; and so it is on its way between folds.
+      const bool between = !flanks_.empty() || (!converged && view_.overlaps());
+      if (between && spot_.point != probe_) state_.normal = (spot_.point - probe_).normalized();
       for (const Fold& flank : flanks_) state_.places.push_back(flank.place);
     }
     return {true, true, converged, false, spot_.point, state_.normal};
@@ -223,8 +224,11 @@ class PointProxy {
 
   /// Along one fold, in legs, so that what is in the way is seen before much has been walked in vain.
   Way go(DescentEnd& end) noexcept;
-  /// On from where it has met another fold where it stands.
-  Way stand_beside(const Fold& met) noexcept;
+  /// Along the crease with a flank whose plane, as it is known, would let it pass.
+  Way along_flank(std::size_t known) noexcept;
+  /// The flank that a way along the fold from a place has left only to meet it a little farther on, or how many there
+  /// are.
+  [[nodiscard]] std::size_t soon_again(const Fold& met, const Fold& from) const noexcept;
   /// Whether two are one, from whichever side.
   [[nodiscard]] bool is_same(const Fold& one, const Fold& other) const noexcept {
     constexpr double same_direction = 0.999;
