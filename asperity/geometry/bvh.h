@@ -43,7 +43,7 @@ struct FaceBoxes {
   UnsetVector<BoxesOf8> leaves;
   UnsetVector<BoxesOf8> nodes;
   UnsetVector<Box> faces;  ///< without a hierarchy (m), by the triangles' numbers
-  double farther = 0.0;    ///< how far they reach beyond the triangles' own boxes at most (m)
+  double farther = 0.0;    ///< and how far they reach beyond the triangles' own boxes at most (m)
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return (leaves.capacity() + nodes.capacity()) * sizeof(BoxesOf8) + faces.capacity() * sizeof(Box);
   }

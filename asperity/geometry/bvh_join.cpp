@@ -147,11 +147,16 @@ class Bvh::Join {
       // Within one leaf, with those that come after.
       unsigned met = meeting(leaves_[other], slot(leaves_[one], i)) & (one == other ? ~1U << i : ~0U);
       if (met == 0) continue;
+      met &= ~neighbours(corners_[other], corners_[one], i);
+      if (met == 0) continue;
+      // All eight are written, each over the last that was not wanted: how many are is anyone's guess.
       std::uint32_t others[8];
       std::size_t count = 0;
-      for (met &= ~neighbours(corners_[other], corners_[one], i); met != 0; met &= met - 1)
-        others[count++] = bvh_.leaves_[other].face[__builtin_ctz(met)];
-      if (count > 0) visit(bvh_.leaves_[one].face[i], {others, count});
+      for (std::size_t j = 0; j < 8; ++j) {
+        others[count] = bvh_.leaves_[other].face[j];
+        count += met >> j & 1U;
+      }
+      visit(bvh_.leaves_[one].face[i], {others, count});
     }
   }
 
@@ -178,28 +183,26 @@ class Bvh::Join {
 
 FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
   // In the hierarchy's own units, grown by more than their rounding.
-  using Four = double __attribute__((vector_size(32)));
-  using FourFloats = float __attribute__((vector_size(16)));
-  const auto local = [&](const Four& at, const Four& origin, float sign) {
-    const FourFloats x = __builtin_convertvector((at - origin) * per_scale_, FourFloats);
-    const FourFloats size = x < 0.0F ? -x : x;
-    return x + sign * (1e-6F * (1.0F + size));
-  };
-  const Four origin = {origin_.x(), origin_.y(), origin_.z(), 0.0};
-  const auto set = [&](BoxesOf8& to, std::size_t slot, const Box& box) {
-    // One by one, as they have just been written.
-    const FourFloats lower = local(Four{box.lower.x(), box.lower.y(), box.lower.z(), 0.0}, origin, -1.0F);
-    const FourFloats upper = local(Four{box.upper.x(), box.upper.y(), box.upper.z(), 0.0}, origin, 1.0F);
+  const auto set = [&](BoxesOf8& to, const Box(&boxes)[8], std::size_t count) {
+    using Eight = double __attribute__((vector_size(64)));
+    const auto grown = [&](float(&out)[8], float sign, int axis, const auto& of) {
+      const Eight at{of(boxes[0])[axis], of(boxes[1])[axis], of(boxes[2])[axis], of(boxes[3])[axis],
+                     of(boxes[4])[axis], of(boxes[5])[axis], of(boxes[6])[axis], of(boxes[7])[axis]};
+      const Floats x = __builtin_convertvector((at - origin_[axis]) * per_scale_, Floats);
+      const Floats size = x < 0.0F ? -x : x;
+      const Floats all = x + sign * (1e-6F * (1.0F + size));
+      std::memcpy(out, &all, sizeof(out));
+    };
     for (int axis = 0; axis < 3; ++axis) {
-      to.lower[axis][slot] = lower[axis];
-      to.upper[axis][slot] = upper[axis];
+      grown(to.lower[axis], -1.0F, axis, [](const Box& box) -> const Vec3& { return box.lower; });
+      grown(to.upper[axis], 1.0F, axis, [](const Box& box) -> const Vec3& { return box.upper; });
     }
+    for (std::size_t i = count; i < 8; ++i) to.set(i, FloatBox{});
   };
   FaceBoxes all{UnsetVector<BoxesOf8>(leaves_.size()), UnsetVector<BoxesOf8>(nodes_.size()), {}};
   UnsetVector<FloatBox> whole(leaves_.size());
   const ParallelSettings shares{.grain = std::max<std::size_t>(1, grain / 8)};
-  std::vector<Farthest> farther(parallel_workers(leaves_.size(), shares));
-  parallel_for(leaves_.size(), shares, [&](std::size_t leaf, unsigned worker) {
+  parallel_for(leaves_.size(), shares, [&](std::size_t leaf) {
     const auto used = [&](std::size_t of) {
       const std::uint32_t(&faces)[8] = leaves_[std::min(of, leaves_.size() - 1)].face;
       return std::span(faces, static_cast<std::size_t>(std::find(faces, faces + 8, no_index) - faces));
@@ -207,16 +210,7 @@ FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
     const std::span<const std::uint32_t> faces = used(leaf);
     Box boxes[8];
     over(faces, used(leaf + 2), {boxes, faces.size()});
-    double most = 0.0;
-    for (std::size_t i = 0; i < 8; ++i) {
-      if (i >= faces.size()) {
-        all.leaves[leaf].set(i, FloatBox{});
-        continue;
-      }
-      set(all.leaves[leaf], i, boxes[i]);
-      most = std::max(most, beyond(*mesh_, faces[i], boxes[i]));
-    }
-    farther[worker].value = std::max(farther[worker].value, most);
+    set(all.leaves[leaf], boxes, faces.size());
     whole[leaf] = around(all.leaves[leaf]);
   });
   UnsetVector<FloatBox> below(nodes_.size());
@@ -228,7 +222,6 @@ FaceBoxes Bvh::enclosed(const BoxesOver& over, std::size_t grain) const {
     }
     below[node] = around(all.nodes[node]);
   }
-  all.farther = farthest_of(farther);
   return all;
 }
 

@@ -239,44 +239,86 @@ ReliefSurface::Enclosed ReliefSurface::enclose() {
   return enclosed;
 }
 
-void ReliefSurface::find_overlaps(const Enclosed& enclosed) {
-  const TriangleMesh& mesh = base_.mesh();
-  const Vec3 centre = mesh.bounds().centre();
-  UnsetVector<RoundedVertex> vertices(mesh.positions().size());
-  parallel_for(vertices.size(), {.grain = cheap_faces_a_share}, [&](std::size_t i) {
-    const Vec3f place = (mesh.positions()[i] - centre).cast<float>();
-    const Vec3f& direction = shell_.directions[i];
-    vertices[i].place = Corners{place.x(), place.y(), place.z(), 0.0F};
-    vertices[i].direction = Corners{direction.x(), direction.y(), direction.z(), 0.0F};
-  });
-  const auto size = static_cast<float>(1.01 * (mesh.bounds().extent().sum() + 3.0 * reach_));
-  const auto slab_of = [&](std::uint32_t face) {
-    return rounded_slab(vertices.data(), mesh.triangles()[face], ranges_[face].lowest, ranges_[face].highest);
-  };
-  const auto box_of = [&](std::uint32_t face) {
-    if (!enclosed.boxes.empty()) return enclosed.boxes[face];
-    Box box;
-    static_cast<void>(enclose_face(face, box));
-    return box;
-  };
-  std::atomic<std::uint32_t> pairs{0};
-  overlapped_.assign(mesh.triangles().size(), 0);
-  const auto mark = [&](std::uint32_t face) {
-    std::atomic_ref<std::uint8_t>(overlapped_[face]).store(1, std::memory_order_relaxed);
-  };
-  base_.index().for_each_meeting(boxes_, [&](std::uint32_t face, std::span<const std::uint32_t> others) {
-    const RoundedSlab slab = slab_of(face);
+/// Which faces of a relief meet others in space.
+class ReliefSurface::Overlaps {
+ public:
+  Overlaps(ReliefSurface& relief, const Enclosed& enclosed)
+      : relief_(relief),
+        enclosed_(enclosed),
+        mesh_(relief.base_.mesh()),
+        vertices_(mesh_.positions().size()),
+        size_(static_cast<float>(1.01 * (mesh_.bounds().extent().sum() + 3.0 * relief.reach_))) {
+    const Vec3 centre = mesh_.bounds().centre();
+    parallel_for(vertices_.size(), {.grain = cheap_faces_a_share}, [&](std::size_t i) {
+      const Vec3f place = (mesh_.positions()[i] - centre).cast<float>();
+      const Vec3f& direction = relief_.shell_.directions[i];
+      vertices_[i] =
+          RoundedVertex{place.x(), place.y(), place.z(), 0.0F, direction.x(), direction.y(), direction.z(), 0.0F};
+    });
+  }
+
+  /// Marks those of some faces that meet the relief over another one.
+  void mark(std::uint32_t face, std::span<const std::uint32_t> others) {
+#if defined(__x86_64__)
+    if (has_avx2()) return mark_avx2(face, others);
+#endif
+    mark_any(face, others);
+  }
+  [[nodiscard]] std::uint32_t pairs() const noexcept {
+    return pairs_;
+  }
+
+ private:
+#if defined(__x86_64__)
+  __attribute__((target("avx2"))) void mark_avx2(std::uint32_t face, std::span<const std::uint32_t> others) {
+    mark_any(face, others);
+  }
+#endif
+  [[gnu::always_inline]] inline void mark_any(std::uint32_t face, std::span<const std::uint32_t> others) {
+    RoundedSlab one;
+    round(face, one);
     for (const std::uint32_t other : others) {
-      if (surely_apart(slab, slab_of(other), size)) continue;
-      if (slabs_apart({shell_.prism(mesh, face), range(face)}, {shell_.prism(mesh, other), range(other)})) continue;
-      if (!box_of(face).overlaps(box_of(other))) continue;
-      pairs.fetch_add(1, std::memory_order_relaxed);
-      mark(face);
-      mark(other);
+      RoundedSlab slab;
+      round(other, slab);
+      if (!surely_apart(one, slab, size_)) look_closely(face, other);
     }
-  });
-  report_.overlapping_pairs = pairs;
-  if (pairs == 0) overlapped_ = {};
+  }
+  [[gnu::always_inline]] inline void round(std::uint32_t face, RoundedSlab& slab) const {
+    const FaceRange& range = relief_.ranges_[face];
+    round_slab(vertices_.data(), mesh_.triangles()[face], range.lowest, range.highest, slab);
+  }
+
+  [[gnu::noinline]] void look_closely(std::uint32_t face, std::uint32_t other) {
+    if (slabs_apart({relief_.shell_.prism(mesh_, face), relief_.range(face)},
+                    {relief_.shell_.prism(mesh_, other), relief_.range(other)}) ||
+        !box_of(face).overlaps(box_of(other)))
+      return;
+    pairs_.fetch_add(1, std::memory_order_relaxed);
+    for (const std::uint32_t one : {face, other})
+      std::atomic_ref<std::uint8_t>(relief_.overlapped_[one]).store(1, std::memory_order_relaxed);
+  }
+  [[nodiscard]] Box box_of(std::uint32_t face) const {
+    if (!enclosed_.boxes.empty()) return enclosed_.boxes[face];
+    Box box;
+    static_cast<void>(relief_.enclose_face(face, box));
+    return box;
+  }
+
+  ReliefSurface& relief_;
+  const Enclosed& enclosed_;
+  const TriangleMesh& mesh_;
+  UnsetVector<RoundedVertex> vertices_;
+  float size_;
+  std::atomic<std::uint32_t> pairs_{0};
+};
+
+void ReliefSurface::find_overlaps(const Enclosed& enclosed) {
+  overlapped_.assign(base_.mesh().triangles().size(), 0);
+  Overlaps overlaps(*this, enclosed);
+  base_.index().for_each_meeting(
+      boxes_, [&](std::uint32_t face, std::span<const std::uint32_t> others) { overlaps.mark(face, others); });
+  report_.overlapping_pairs = overlaps.pairs();
+  if (overlaps.pairs() == 0) overlapped_ = {};
 }
 
 }  // namespace asperity

@@ -180,6 +180,7 @@ class ReliefSurface {
   struct CarriedHeights;
   struct Enclosed;
   class EnclosedByFour;
+  class Overlaps;
   ReliefSurface(MeshSurface base, Coat coat, MeshSurface rest, std::shared_ptr<CarriedHeights> carried);
   /// Finds what the moved reliefs have in common with this one.
   void carry() const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "asperity/field/height/range.h"
 #include "asperity/surface/shell.h"
@@ -61,66 +62,66 @@ inline bool slabs_apart(const Slab& one, const Slab& other) {
   return false;
 }
 
-// Four floats side by side: the three corners of a face, the last of them twice; or a vector and a place unused.
-using Corners = float __attribute__((vector_size(16)));
+using EightFloats = float __attribute__((vector_size(32)));
+using EightPlaces = std::int32_t __attribute__((vector_size(32)));
 
-/// A vertex in single precision: where it is from a centre, and the shell's direction there.
-struct RoundedVertex {
-  Corners place;
-  Corners direction;
+/// A vertex in single precision.
+// Told how to lie: where a compiler may not use AVX it takes half of that to be enough.
+struct alignas(32) RoundedVertex {
+  EightFloats place_and_direction;  ///< of the shell there, the fourth and eighth unused
 };
 
 /// A slab in single precision: for the direction that separates nearly all that boxes let through.
-struct RoundedSlab {
-  Corners base[3];
-  Corners direction[3];
-  float lowest;
-  float highest;
-  float centre[3];
+struct alignas(32) RoundedSlab {
+  EightFloats corner[3];
+  EightFloats lowest;  ///< of its heights, eight times
+  EightFloats highest;
 };
 
-inline RoundedSlab rounded_slab(const RoundedVertex* vertices, const TriangleMesh::Triangle& t, float lowest,
-                                float highest) {
-  RoundedSlab slab;
-  const auto turned = [](const Corners& a, const Corners& b, const Corners& c, Corners(&out)[3]) {
-    using Places = std::int32_t __attribute__((vector_size(16)));
-    const Corners xy = __builtin_shuffle(a, b, Places{0, 4, 1, 5});
-    out[0] = __builtin_shuffle(xy, c, Places{0, 1, 4, 4});
-    out[1] = __builtin_shuffle(xy, c, Places{2, 3, 5, 5});
-    out[2] = __builtin_shuffle(__builtin_shuffle(a, b, Places{2, 6, 2, 6}), c, Places{0, 1, 6, 6});
-  };
-  const RoundedVertex& a = vertices[t[0]];
-  const RoundedVertex& b = vertices[t[1]];
-  const RoundedVertex& c = vertices[t[2]];
-  turned(a.place, b.place, c.place, slab.base);
-  turned(a.direction, b.direction, c.direction, slab.direction);
-  const Corners centre = (a.place + b.place + c.place) / 3.0F;
-  for (int axis = 0; axis < 3; ++axis) slab.centre[axis] = centre[axis];
-  slab.lowest = lowest;
-  slab.highest = highest;
-  return slab;
+[[gnu::always_inline]] inline void round_slab(const RoundedVertex* vertices, const TriangleMesh::Triangle& t,
+                                              float lowest, float highest, RoundedSlab& slab) {
+  for (std::size_t k = 0; k < 3; ++k) slab.corner[k] = vertices[t[k]].place_and_direction;
+  slab.lowest = EightFloats{} + lowest;
+  slab.highest = EightFloats{} + highest;
 }
 
-/// How far a slab reaches along an axis at most.
-inline float highest_along(const RoundedSlab& slab, const float (&axis)[3]) {
-  const Corners base = axis[0] * slab.base[0] + axis[1] * slab.base[1] + axis[2] * slab.base[2];
-  const Corners lean = axis[0] * slab.direction[0] + axis[1] * slab.direction[1] + axis[2] * slab.direction[2];
-  const Corners low = base + slab.lowest * lean;
-  const Corners high = base + slab.highest * lean;
-  const Corners most = low > high ? low : high;
-  return std::max({most[0], most[1], most[2]});
+/// Sums over each half of three, as (a, b, c, c).
+[[gnu::always_inline]] inline void sum_halves(const EightFloats& a, const EightFloats& b, const EightFloats& c,
+                                              EightFloats& sums) {
+  constexpr EightPlaces lower{0, 8, 1, 9, 4, 12, 5, 13};
+  constexpr EightPlaces upper{2, 10, 3, 11, 6, 14, 7, 15};
+  const EightFloats ab = __builtin_shuffle(a, b, lower) + __builtin_shuffle(a, b, upper);
+  const EightFloats cc = __builtin_shuffle(c, c, lower) + __builtin_shuffle(c, c, upper);
+  sums = __builtin_shuffle(ab, cc, EightPlaces{0, 1, 8, 9, 4, 5, 12, 13}) +
+         __builtin_shuffle(ab, cc, EightPlaces{2, 3, 10, 11, 6, 7, 14, 15});
+}
+
+/// How far a slab reaches along an axis at most, in each place of the first half. `axis`: twice.
+[[gnu::always_inline]] inline void highest_along(const RoundedSlab& slab, const EightFloats& axis, EightFloats& most) {
+  EightFloats base;
+  sum_halves(slab.corner[0] * axis, slab.corner[1] * axis, slab.corner[2] * axis, base);
+  const EightFloats lean = __builtin_shuffle(base, EightPlaces{4, 5, 6, 7, 4, 5, 6, 7});
+  const EightFloats low = base + slab.lowest * lean;
+  const EightFloats high = base + slab.highest * lean;
+  most = low > high ? low : high;
 }
 
 /// Whether a plane across the line from one to the other surely separates them. `size`: more than the sum of the
 /// coordinates of anything in either.
-inline bool surely_apart(const RoundedSlab& one, const RoundedSlab& other, float size) {
-  const float axis[3] = {other.centre[0] - one.centre[0], other.centre[1] - one.centre[1],
-                         other.centre[2] - one.centre[2]};
-  const float back[3] = {-axis[0], -axis[1], -axis[2]};
+[[gnu::always_inline]] inline bool surely_apart(const RoundedSlab& one, const RoundedSlab& other, float size) {
+  const EightFloats between =
+      ((other.corner[0] - one.corner[0]) + (other.corner[1] - one.corner[1])) + (other.corner[2] - one.corner[2]);
+  const EightFloats axis = __builtin_shuffle(between, EightPlaces{0, 1, 2, 3, 0, 1, 2, 3});
   // A sum of six products, of numbers that are rounded themselves.
   constexpr float rounding = 4e-6F;
-  const float length = std::abs(axis[0]) + std::abs(axis[1]) + std::abs(axis[2]);
-  return highest_along(one, axis) + highest_along(other, back) + rounding * length * size < 0.0F;
+  const EightFloats length = axis < 0.0F ? -axis : axis;
+  EightFloats ahead;
+  EightFloats behind;
+  highest_along(one, axis, ahead);
+  highest_along(other, -axis, behind);
+  return std::max({ahead[0], ahead[1], ahead[2]}) + std::max({behind[0], behind[1], behind[2]}) +
+             rounding * (length[0] + length[1] + length[2]) * size <
+         0.0F;
 }
 
 /// Around the hull of a slab.
