@@ -252,15 +252,21 @@ std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally
         if (!held_since && std::abs(force - judged) < 0.1 * judged && rng.below(16) != 0) continue;
         judged = force;
         ++tally.asked;
-        double left = (bodies.led(sample.proxy, probe) - probe).norm();
+        const double held = (sample.proxy - probe).norm();
+        const auto within = [&](double left) { return force <= test::stiffness * (most * left + 4.0 * tolerance); };
         // Over the brink of a face no step leads nearer at first.
         constexpr double off_brink = 30e-6;
-        const double held = (sample.proxy - probe).norm();
-        if ((bodies.led(sample.proxy, probe, 0.2e-6, off_brink, 0.05) - probe).norm() > held - off_brink) left = held;
-        if (friction > 0.0 && bodies.may_stick(sample.proxy, probe, 1.2 * friction)) left = held;
+        const auto on_brink = [&] {
+          return (bodies.led(sample.proxy, probe, 0.2e-6, off_brink, 0.05) - probe).norm() > held - off_brink;
+        };
+        // The dearest last.
+        double left = held;
+        const bool may_rest =
+            within(held) && ((friction > 0.0 && bodies.may_stick(sample.proxy, probe, 1.2 * friction)) ||
+                             within(left = (bodies.led(sample.proxy, probe) - probe).norm()) || on_brink());
         // A barrier may be passed a little late.
         constexpr double late = 30e-6;
-        if (force <= test::stiffness * (most * left + 4.0 * tolerance)) {
+        if (may_rest) {
           held_since.reset();
         } else if (!held_since) {
           held_since = probe;

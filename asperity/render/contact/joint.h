@@ -88,6 +88,7 @@ class JointSolve {
   [[nodiscard]] Met first_met(const Segment& motion, const HeldSet& from, const HeldSet& to) noexcept;
   std::size_t hold_to(const Met& met) noexcept;
   [[nodiscard]] bool onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexcept;
+  bool come_to(std::span<const std::size_t> which, const PlaneSet& walls, Vec3 place, Vec3& proxy) noexcept;
   [[nodiscard]] bool slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept;
   [[nodiscard]] bool along_crease(std::size_t which, std::size_t stopped, const Vec3& goal, const PlaneSet& planes,
                                   PlaneProjection& projection) const noexcept;

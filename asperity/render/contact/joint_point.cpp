@@ -221,6 +221,17 @@ bool JointSolve::onto(HeldSet& on, const PlaneSet& walls, Vec3& position) noexce
   return false;
 }
 
+/// To where some of what it is held to and walls meet, near a place. Whether they do, with nothing else on the way.
+bool JointSolve::come_to(std::span<const std::size_t> which, const PlaneSet& walls, Vec3 place, Vec3& proxy) noexcept {
+  HeldSet before;
+  for (const std::size_t one : which) before.push_back(held_[one]);
+  HeldSet on = before;
+  if (!onto(on, walls, place) || first_met({proxy, place}, before, on).hit) return false;
+  for (std::size_t k = 0; k < which.size(); ++k) held_[which[k]] = on[k];
+  proxy = place;
+  return true;
+}
+
 /// Along one surface to the goal, or to what is in the way: `stopped`, then. Whether it came to rest on it.
 bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept {
   stopped = no_owner;
@@ -240,22 +251,17 @@ bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::si
     stopped = met.owner;
     held_[which] = before[0];
     // To where the two meet; or else, from where it was, by planes that hold both.
-    Vec3 crease = proxy + met.t * (to - proxy);
-    HeldSet on = before;
+    FixedVector<std::size_t, 2> both;
+    both.push_back(which);
     PlaneSet walls;
-    std::size_t other = held_.size();
     if (entries_[met.owner].smooth) {
-      other = hold_to(met);
+      const std::size_t other = hold_to(met);
       if (other == which || other == held_.size()) return false;
-      on.push_back(held_[other]);
-      before.push_back(held_[other]);
+      both.push_back(other);
     } else {
       walls.push_back(plane_of(met.owner, met.what.contact));
     }
-    if (!onto(on, walls, crease) || first_met({proxy, crease}, before, on).hit) return false;
-    held_[which] = on[0];
-    if (on.size() > 1) held_[other] = on[1];
-    proxy = crease;
+    come_to({both.begin(), both.end()}, walls, proxy + met.t * (to - proxy), proxy);
     return false;
   }
   return false;
@@ -300,7 +306,7 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     step *= most / step.norm();
     whole = false;
   }
-  FixedVector<std::size_t, 3> holding;
+  FixedVector<std::size_t, 4> holding;
   PlaneSet walls;
   PlaneSet also;  // walls that it met where it stands
   const auto holds = [&](std::size_t which) {
@@ -344,7 +350,18 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
         const HeldSet before = held_;
         const std::size_t known = hold_to(met);
         if (known == held_.size()) return Move::none;
-        if (!holds(known)) return Move::learned;
+        if (!holds(known)) {
+          const Vec3 left = proxy;
+          const HeldSet learned = held_;
+          holding.push_back(known);
+          if (met.t * step.norm() > tolerance_ &&
+              come_to({holding.begin(), holding.end()}, walls, proxy + met.t * (next - proxy), proxy) &&
+              nearer(proxy, left, goal))
+            return Move::nearer;
+          proxy = left;
+          held_ = learned;
+          return Move::learned;
+        }
         // It keeps to that already: no farther than there.
         held_ = before;
       } else {
