@@ -13,7 +13,7 @@ namespace {
 // cheaper than a search around its start, where there are more triangles than a patch can hold.
 constexpr double long_motion_in_edges = 12.0;
 constexpr double crowded_motion_in_edges = 0.5;
-constexpr double patch_slack_in_edges = 4.0;
+constexpr double patch_slack_in_edges = 1.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
 
