@@ -357,6 +357,22 @@ TEST(StrokesThatOnceFailed, a_slip_that_only_a_part_of_leads_nearer) {
   EXPECT_GT(tally.touching, 3000U);
 }
 
+// Along a surface that bends away from its chord, what the chord met was nowhere near, and it did not go on.
+TEST(StrokesThatOnceFailed, a_way_that_bends_away_from_what_its_chord_meets) {
+  Tally tally;
+  std::map<std::string, int> kinds;
+  for (const std::string& wrong : strokes_over(20783, 132, tally, kinds, folds)) ADD_FAILURE() << wrong;
+  EXPECT_GT(tally.asked, 50U);
+}
+
+// Two reliefs: a tenth of a skin before one of them it was put a skin off the other, and so behind the first.
+TEST(StrokesThatOnceFailed, lifted_off_one_surface_it_stays_before_the_next) {
+  Tally tally;
+  std::map<std::string, int> kinds;
+  for (const std::string& wrong : strokes_over(20783, 137, tally, kinds, folds)) ADD_FAILURE() << wrong;
+  EXPECT_GT(tally.touching, 3000U);
+}
+
 }  // namespace
 
 }  // namespace asperity::strokes

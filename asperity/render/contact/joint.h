@@ -41,8 +41,6 @@ class JointSolve {
   [[nodiscard]] bool complete() const noexcept;
   /// Tells the contact of entry `index` where it is touched, or nearest. [servo]
   void remember_places(std::size_t index, const ConstraintSolution& solution) noexcept;
-  /// A place where a point is held, a skin off what holds it: from there it may fly. [servo]
-  [[nodiscard]] Vec3 lifted(const Vec3& position) const noexcept;
 
  private:
   struct Entry {
@@ -92,6 +90,7 @@ class JointSolve {
   [[nodiscard]] bool slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept;
   [[nodiscard]] bool along_crease(std::size_t which, std::size_t stopped, const Vec3& goal, const PlaneSet& planes,
                                   PlaneProjection& projection) const noexcept;
+  [[nodiscard]] Vec3 lifted(const Vec3& position) noexcept;
   [[nodiscard]] bool fly(const Vec3& goal, Vec3& proxy) noexcept;
   [[nodiscard]] Move step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
                                   Vec3& proxy) noexcept;

@@ -13,6 +13,7 @@ namespace {
 
 // Evaluations of one way along a surface: in legs, so that what is in the way is seen before much is walked in vain.
 constexpr int first_leg = 24;
+constexpr int short_leg = 2;
 constexpr int most_walk = 1024;
 // Back to a surface from a place near it.
 constexpr int short_walk = 24;
@@ -235,7 +236,10 @@ bool JointSolve::come_to(std::span<const std::size_t> which, const PlaneSet& wal
 /// Along one surface to the goal, or to what is in the way: `stopped`, then. Whether it came to rest on it.
 bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept {
   stopped = no_owner;
-  for (int walked = 0, leg = first_leg; walked < most_walk && !work_.spent(); walked += leg, leg *= 2) {
+  int leg = first_leg;
+  for (int walked = 0; walked < most_walk && !work_.spent(); leg *= 2) {
+    walked += leg;
+    const HeldSet had = held_;
     HeldSet before;
     before.push_back(held_[which]);
     const DescentEnd end = walk(held_[which], goal, true, leg, work_.left());
@@ -261,19 +265,24 @@ bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::si
     } else {
       walls.push_back(plane_of(met.owner, met.what.contact));
     }
-    come_to({both.begin(), both.end()}, walls, proxy + met.t * (to - proxy), proxy);
-    return false;
+    if (come_to({both.begin(), both.end()}, walls, proxy + met.t * (to - proxy), proxy) || leg <= short_leg)
+      return false;
+    // The way bends, and what its chord meets it may never come to.
+    held_ = had;
+    leg = short_leg / 2;
   }
   return false;
 }
 
-Vec3 JointSolve::lifted(const Vec3& position) const noexcept {
+/// A little off what it is held to, as far as nothing else is in the way.
+Vec3 JointSolve::lifted(const Vec3& position) noexcept {
   Vec3 out = position;
   for (const Held& held : held_) {
     const double skin = entries_[held.owner].skin;
     out += std::max(0.0, skin - held.normal.dot(out - held.point)) * held.normal;
   }
-  return out;
+  const Met met = first_met({position, out}, held_, held_);
+  return met.hit ? Vec3(position + 0.5 * met.t * (out - position)) : out;
 }
 
 /// Straight to the goal through free space. Whether it got there.
