@@ -69,7 +69,12 @@ class JointSolve {
     SweptHit what;
   };
   static constexpr std::size_t no_owner = most_contacts;
-  enum class Move { none, nearer, learned };
+  enum class Move {
+    none,
+    nearer,
+    learned,  ///< of something in the way
+    rest,     ///< pressed into a crease, nowhere along which it would be nearer
+  };
 
   /// Whether it is a point, and led along the surfaces themselves.
   [[nodiscard]] bool leads_point() const noexcept { return radius_ == 0.0 && smooth_ && !facets_; }

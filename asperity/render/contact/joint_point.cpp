@@ -17,6 +17,8 @@ constexpr int short_leg = 2;
 constexpr int most_walk = 1024;
 // Back to a surface from a place near it.
 constexpr int short_walk = 24;
+// Of the tolerance: what it comes nearer by less in a move waits for the next tick.
+constexpr double worth_going_on = 0.1;
 
 bool nearer(const Vec3& now, const Vec3& before, const Vec3& goal) noexcept {
   constexpr double least_gain = 1e-9;
@@ -305,6 +307,7 @@ bool JointSolve::fly(const Vec3& goal, Vec3& proxy) noexcept {
 /// Along the crease between what holds it, or a part of the way.
 JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
                                           Vec3& proxy) noexcept {
+  constexpr int most_attempts = 4;
   constexpr double most_grains = 4.0;
   Vec3 step = projection.point - proxy;
   bool whole = true;
@@ -325,9 +328,11 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     // What it does not touch yet it comes to at the end of the way, not on a part of it.
     holding.clear();
     walls = also;
+    bool pressed = also.empty();  // against all that the way is along
     for (const PlaneProjection::Active& active : projection.active) {
       const ConstraintPlane& plane = planes[active.plane];
       const double above = plane.normal.dot(proxy) - plane.offset - plane.skin;
+      pressed = pressed && active.multiplier > 0.0 && above <= 2.0 * margin();
       if (!whole && above > 2.0 * margin()) continue;
       if (active.plane < held_.size()) {
         holding.push_back(active.plane);
@@ -340,7 +345,19 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     for (const std::size_t which : holding) from.push_back(held_[which]);
     HeldSet on = from;
     Vec3 next = proxy + step;
-    bool good = onto(on, walls, next) && nearer(next, proxy, goal);
+    const bool meet = onto(on, walls, next);
+    bool good = meet && nearer(next, proxy, goal);
+    if (meet && !good && attempt + 1 < most_attempts) {
+      // It bends: on to where a parabola through what is known of it would be nearest.
+      const double distance = (proxy - goal).norm();
+      const double gain = (goal - proxy).dot(step) / distance;
+      const double lost = gain + (next - goal).norm() - distance;
+      const double share = std::clamp(0.5 * gain / lost, 0.0, 0.5);
+      if (!(share * step.norm() > tolerance_)) return pressed ? Move::rest : Move::none;
+      step *= share;
+      whole = false;
+      continue;
+    }
     for (std::size_t i = 0; good && i < held_.size(); ++i) {
       if (holds(i)) continue;
       walk(after[i], next, false, short_walk);
@@ -428,8 +445,6 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
   constexpr int most_moves = 64;
   constexpr int most_idle = 2;
   constexpr double short_slide = 0.1;  // of what it was to go
-  // What it comes nearer by less in a move waits for the next tick.
-  constexpr double worth_going_on = 0.1;  // of the tolerance
   if (!attached_) attach(solution.proxy);
   Vec3& proxy = solution.proxy;
   PlaneSet& planes = solution.planes;
@@ -459,6 +474,10 @@ void JointSolve::settle_point(const Vec3& goal, ConstraintSolution& solution) no
       const bool crease = projection.active.size() > 1 || lead == held_.size() ||
                           (stopped != no_owner && along_crease(lead, stopped, goal, planes, projection));
       const Move way = crease ? step_between(planes, projection, goal, proxy) : Move::none;
+      if (way == Move::rest) {
+        solution.converged = true;
+        return;
+      }
       if (way == Move::learned && ++learned <= most_learned) continue;
       if (way != Move::nearer && lead < held_.size()) {
         solution.converged = slide(lead, goal, proxy, stopped);
