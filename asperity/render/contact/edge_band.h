@@ -39,10 +39,17 @@ inline std::uint32_t prism_owner(const ReliefSurface& surface, const Prisms& pri
   const TriangleMesh& mesh = surface.base().mesh();
   std::uint32_t owner = no_index;
   double nearest = infinity;
+  const double rounding = 1e-12 * (mesh.bounds().diagonal() + probe.norm());
   Box around;
   around.include(probe);
   surface.base().index().for_each_in_box(around.grown(prisms.half_height()), [&](std::uint32_t face) {
-    if (!prisms.contains(face, probe)) return;
+    // Most of them are farther than the nearest so far, or than any prism reaches.
+    constexpr double room = 1.0 + 1e-9;
+    const auto [a, b, c] = mesh.corners(face);
+    const Vec3 across = (b - a).cross(c - a);
+    const double above = across.dot(probe - a);
+    const double most = room * std::min(nearest, prisms.half_height()) + rounding;
+    if (above * above > most * most * across.squaredNorm() || !prisms.contains(face, probe)) return;
     const double distance = std::abs(barycentric_frame(mesh, face).height(probe));
     if (distance < nearest || (distance == nearest && face < owner)) {
       owner = face;

@@ -29,6 +29,11 @@ bool Prisms::contains(std::uint32_t face, const Vec3& p) const noexcept {
     low[i] = mesh_->positions()[order[i]] - offset;
     high[i] = mesh_->positions()[order[i]] + offset;
   }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::min({low[0][axis], low[1][axis], low[2][axis], high[0][axis], high[1][axis], high[2][axis]}) > p[axis] ||
+        std::max({low[0][axis], low[1][axis], low[2][axis], high[0][axis], high[1][axis], high[2][axis]}) < p[axis])
+      return false;
+  }
   return tetrahedron_contains(p, low[0], low[1], low[2], high[2]) ||
          tetrahedron_contains(p, low[0], low[1], high[1], high[2]) ||
          tetrahedron_contains(p, low[0], high[0], high[1], high[2]);
