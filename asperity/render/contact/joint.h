@@ -2,6 +2,9 @@
 // The joint solve: one proxy, a point or a ball, among the surfaces around it. For everything but a point on one smooth
 // surface.
 
+#include <algorithm>
+#include <span>
+
 #include "asperity/render/contact/coulomb.h"
 #include "asperity/render/contact/generated_geometry.h"
 #include "asperity/render/contact/planes.h"
@@ -76,6 +79,16 @@ class JointSolve {
     rest,     ///< pressed into a crease, nowhere along which it would be nearer
   };
 
+  /// What a step along a crease keeps to.
+  struct Along {
+    FixedVector<std::size_t, 4> which;  ///< of held_
+    PlaneSet walls;
+    bool pressed = false;  ///< against all that the way is along
+    [[nodiscard]] bool keeps_to(std::size_t one) const noexcept {
+      return std::find(which.begin(), which.end(), one) != which.end();
+    }
+  };
+
   /// Whether it is a point, and led along the surfaces themselves.
   [[nodiscard]] bool leads_point() const noexcept { return radius_ == 0.0 && smooth_ && !facets_; }
   [[nodiscard]] double margin() const noexcept { return leads_point() ? margin_ : std::max(margin_, blown_up_); }
@@ -97,6 +110,11 @@ class JointSolve {
                                   PlaneProjection& projection) const noexcept;
   [[nodiscard]] Vec3 lifted(const Vec3& position) noexcept;
   [[nodiscard]] bool fly(const Vec3& goal, Vec3& proxy) noexcept;
+  [[nodiscard]] Along along(const PlaneSet& planes, const PlaneProjection& projection, const PlaneSet& also,
+                            const Vec3& position, bool whole) const noexcept;
+  [[nodiscard]] bool clear_of_others(const Along& along, const Vec3& position, HeldSet& held) const noexcept;
+  [[nodiscard]] Move come_to_met(std::size_t met, Along& along, const Vec3& place, const Vec3& goal,
+                                 Vec3& proxy) noexcept;
   [[nodiscard]] Move step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
                                   Vec3& proxy) noexcept;
   void release(const Vec3& position) noexcept;

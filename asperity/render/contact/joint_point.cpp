@@ -25,6 +25,15 @@ bool nearer(const Vec3& now, const Vec3& before, const Vec3& goal) noexcept {
   return (now - goal).squaredNorm() < (before - goal).squaredNorm() * (1.0 - least_gain);
 }
 
+/// Of a step along a crease that bends, after which it is no nearer: how much of it a parabola through what is known of
+/// it has at its nearest.
+double nearest_share(const Vec3& from, const Vec3& to, const Vec3& step, const Vec3& goal) noexcept {
+  const double distance = (from - goal).norm();
+  const double gain = (goal - from).dot(step) / distance;
+  const double lost = (to - goal).norm() - distance;
+  return std::clamp(0.5 * gain / (gain + lost), 0.0, 0.5);
+}
+
 }  // namespace
 
 /// Whether a point is where a place is. Walks find that to within a share of the grain, along the surface.
@@ -304,11 +313,57 @@ bool JointSolve::fly(const Vec3& goal, Vec3& proxy) noexcept {
   return false;
 }
 
+/// What a step along a crease keeps to. A step that is not the `whole` way only what it touches: it comes to what it
+/// does not touch yet at the end of the way, not on a part of it. `also`: walls that it has met where it stands.
+JointSolve::Along JointSolve::along(const PlaneSet& planes, const PlaneProjection& projection, const PlaneSet& also,
+                                    const Vec3& position, bool whole) const noexcept {
+  Along along;
+  along.walls = also;
+  along.pressed = also.empty();
+  for (const PlaneProjection::Active& active : projection.active) {
+    const ConstraintPlane& plane = planes[active.plane];
+    const bool near = plane.normal.dot(position) - plane.offset - plane.skin <= 2.0 * margin();
+    along.pressed = along.pressed && active.multiplier > 0.0 && near;
+    if (!whole && !near) continue;
+    if (active.plane < held_.size()) {
+      along.which.push_back(active.plane);
+    } else if (!stands_among(plane, also)) {
+      along.walls.push_back(plane);
+    }
+  }
+  return along;
+}
+
+/// Whether what it touches and does not go along is not in the way at `position`, where they are led to.
+bool JointSolve::clear_of_others(const Along& along, const Vec3& position, HeldSet& held) const noexcept {
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    if (along.keeps_to(i)) continue;
+    walk(held[i], position, false, short_walk);
+    if (!(held[i].normal.dot(position - held[i].point) >= -0.1 * entries_[held[i].owner].skin)) return false;
+  }
+  return true;
+}
+
+/// To where it meets a surface on its way that it did not know of; or else it knows of it from now on.
+JointSolve::Move JointSolve::come_to_met(std::size_t met, Along& along, const Vec3& place, const Vec3& goal,
+                                         Vec3& proxy) noexcept {
+  const Vec3 left = proxy;
+  const HeldSet held = held_;
+  along.which.push_back(met);
+  if ((place - left).norm() > tolerance_ &&
+      come_to({along.which.begin(), along.which.end()}, along.walls, place, proxy) && nearer(proxy, left, goal))
+    return Move::nearer;
+  proxy = left;
+  held_ = held;
+  return Move::learned;
+}
+
 /// Along the crease between what holds it, or a part of the way.
 JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlaneProjection& projection, const Vec3& goal,
                                           Vec3& proxy) noexcept {
   constexpr int most_attempts = 4;
   constexpr double most_grains = 4.0;
+  constexpr double shorter = 0.35;
   Vec3 step = projection.point - proxy;
   bool whole = true;
   for (const PlaneProjection::Active& active : projection.active) {
@@ -318,76 +373,35 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     step *= most / step.norm();
     whole = false;
   }
-  FixedVector<std::size_t, 4> holding;
-  PlaneSet walls;
-  PlaneSet also;  // walls that it met where it stands
-  const auto holds = [&](std::size_t which) {
-    return std::find(holding.begin(), holding.end(), which) != holding.end();
-  };
+  PlaneSet also;
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
-    // What it does not touch yet it comes to at the end of the way, not on a part of it.
-    holding.clear();
-    walls = also;
-    bool pressed = also.empty();  // against all that the way is along
-    for (const PlaneProjection::Active& active : projection.active) {
-      const ConstraintPlane& plane = planes[active.plane];
-      const double above = plane.normal.dot(proxy) - plane.offset - plane.skin;
-      pressed = pressed && active.multiplier > 0.0 && above <= 2.0 * margin();
-      if (!whole && above > 2.0 * margin()) continue;
-      if (active.plane < held_.size()) {
-        holding.push_back(active.plane);
-      } else if (!stands_among(plane, also)) {
-        walls.push_back(plane);
-      }
-    }
+    Along along = this->along(planes, projection, also, proxy, whole);
     HeldSet after = held_;
     HeldSet from;
-    for (const std::size_t which : holding) from.push_back(held_[which]);
+    for (const std::size_t which : along.which) from.push_back(held_[which]);
     HeldSet on = from;
     Vec3 next = proxy + step;
-    const bool meet = onto(on, walls, next);
-    bool good = meet && nearer(next, proxy, goal);
+    const bool meet = onto(on, along.walls, next);
+    const bool good = meet && nearer(next, proxy, goal);
+    whole = false;
     if (meet && !good && attempt + 1 < most_attempts) {
-      // It bends: on to where a parabola through what is known of it would be nearest.
-      const double distance = (proxy - goal).norm();
-      const double gain = (goal - proxy).dot(step) / distance;
-      const double lost = gain + (next - goal).norm() - distance;
-      const double share = std::clamp(0.5 * gain / lost, 0.0, 0.5);
-      if (!(share * step.norm() > tolerance_)) return pressed ? Move::rest : Move::none;
-      step *= share;
-      whole = false;
+      step *= nearest_share(proxy, next, step, goal);
+      if (!(step.norm() > tolerance_)) return along.pressed ? Move::rest : Move::none;
       continue;
     }
-    for (std::size_t i = 0; good && i < held_.size(); ++i) {
-      if (holds(i)) continue;
-      walk(after[i], next, false, short_walk);
-      good = after[i].normal.dot(next - after[i].point) >= -0.1 * entries_[after[i].owner].skin;
-    }
-    for (std::size_t k = 0; k < holding.size(); ++k) after[holding[k]] = on[k];
-    if (good) {
+    if (good && clear_of_others(along, next, after)) {
+      for (std::size_t k = 0; k < on.size(); ++k) after[along.which[k]] = on[k];
       const Met met = first_met({proxy, next}, from, on);
       if (!met.hit) {
         held_ = after;
         proxy = next;
         return Move::nearer;
       }
-      whole = false;
       if (entries_[met.owner].smooth) {
         const HeldSet before = held_;
         const std::size_t known = hold_to(met);
         if (known == held_.size()) return Move::none;
-        if (!holds(known)) {
-          const Vec3 left = proxy;
-          const HeldSet learned = held_;
-          holding.push_back(known);
-          if (met.t * step.norm() > tolerance_ &&
-              come_to({holding.begin(), holding.end()}, walls, proxy + met.t * (next - proxy), proxy) &&
-              nearer(proxy, left, goal))
-            return Move::nearer;
-          proxy = left;
-          held_ = learned;
-          return Move::learned;
-        }
+        if (!along.keeps_to(known)) return come_to_met(known, along, proxy + met.t * (next - proxy), goal, proxy);
         // It keeps to that already: no farther than there.
         held_ = before;
       } else {
@@ -396,17 +410,15 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
           remember(wall);
           return Move::learned;
         }
-        if (met.t * step.norm() <= tolerance_ && !stands_among(wall, walls)) {
+        if (met.t * step.norm() <= tolerance_ && !stands_among(wall, along.walls)) {
           also.push_back(wall);
           continue;
         }
       }
       step *= std::max(0.0, met.t - 1e-3);
-      if (step.norm() <= tolerance_) break;
-      continue;
+    } else {
+      step *= shorter;
     }
-    step *= 0.35;
-    whole = false;
     if (step.norm() <= tolerance_) break;
   }
   return Move::none;
