@@ -34,24 +34,38 @@ struct HullPart {
   double to = 1.0;
   Vec3 start = Vec3::Zero();  ///< of the motion, in the plane's frame
   Vec3 rate = Vec3::Zero();
+  Vec2 shear = Vec2::Zero();  ///< what u and v change by along the mean of the directions, by height over the plane
+  double rise = 1.0;          ///< of the mean of the directions over the plane
 };
 
 /// False where it is nowhere within the hull before `limit`: no more of the face is looked at then.
 bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellPrism& prism, const Segment& segment,
                   double limit, HullPart& part) noexcept {
   const PlaneFrame plane(prism);
-  part = {0.0, std::min(1.0, limit), plane.turned(segment.from - prism.corner),
-          plane.turned(segment.to - segment.from)};
+  part = {.from = 0.0,
+          .to = std::min(1.0, limit),
+          .start = plane.turned(segment.from - prism.corner),
+          .rate = plane.turned(segment.to - segment.from)};
   const Vec3 turned[3] = {plane.turned(prism.direction), plane.turned(prism.direction + prism.turn_u),
                           plane.turned(prism.direction + prism.turn_v)};
   const HeightRange range = surface.range(face);
+  // Sheared, so that the directions lean as much to one side as to the other: the hull is narrower than the box of what
+  // leans.
+  const Vec3 mean = (turned[0] + turned[1] + turned[2]) / 3.0;
+  if (mean.z() > 0.0) {
+    part.shear = mean.head<2>() / mean.z();
+    part.rise = mean.z();
+  }
+  const Vec2& shear = part.shear;
   // u, v, 1 - u - v and the height over the plane, at six points: exact bounds of their hull.
   double low[4] = {infinity, infinity, infinity, infinity};
   double high[4] = {-infinity, -infinity, -infinity, -infinity};
   for (int corner = 0; corner < 3; ++corner) {
+    const double lean_u = turned[corner].x() - shear[0] * turned[corner].z();
+    const double lean_v = turned[corner].y() - shear[1] * turned[corner].z();
     for (const double height : {range.lowest, range.highest}) {
-      const double u = (corner == 1 ? 1.0 : 0.0) + height * turned[corner].x();
-      const double v = (corner == 2 ? 1.0 : 0.0) + height * turned[corner].y();
+      const double u = (corner == 1 ? 1.0 : 0.0) + height * lean_u;
+      const double v = (corner == 2 ? 1.0 : 0.0) + height * lean_v;
       const double values[4] = {u, v, 1.0 - u - v, height * turned[corner].z()};
       for (int k = 0; k < 4; ++k) {
         low[k] = std::min(low[k], values[k]);
@@ -62,12 +76,16 @@ bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellP
   // Room for the rounding of all this: far below a skin.
   const Vec3& start = part.start;
   const Vec3& rate = part.rate;
-  const double room_plane = 1e-9 + 1e-12 * (std::abs(start.x()) + std::abs(start.y()));
+  const double from_u = start.x() - shear[0] * start.z();
+  const double from_v = start.y() - shear[1] * start.z();
+  const double rate_u = rate.x() - shear[0] * rate.z();
+  const double rate_v = rate.y() - shear[1] * rate.z();
+  const double room_plane = 1e-9 + 1e-12 * (std::abs(start.x()) + std::abs(start.y()) +
+                                            (std::abs(shear[0]) + std::abs(shear[1])) * std::abs(start.z()));
   const double room_height = 1e-3 * surface.skin() + 1e-14 * std::abs(start.z());
-  return cut(start.x(), rate.x(), low[0] - room_plane, high[0] + room_plane, part.from, part.to) &&
-         cut(start.y(), rate.y(), low[1] - room_plane, high[1] + room_plane, part.from, part.to) &&
-         cut(1.0 - start.x() - start.y(), -rate.x() - rate.y(), low[2] - room_plane, high[2] + room_plane, part.from,
-             part.to) &&
+  return cut(from_u, rate_u, low[0] - room_plane, high[0] + room_plane, part.from, part.to) &&
+         cut(from_v, rate_v, low[1] - room_plane, high[1] + room_plane, part.from, part.to) &&
+         cut(1.0 - from_u - from_v, -rate_u - rate_v, low[2] - room_plane, high[2] + room_plane, part.from, part.to) &&
          cut(start.z(), rate.z(), low[3] - room_height, high[3] + room_height, part.from, part.to);
 }
 
@@ -154,10 +172,10 @@ class PatchRay {
     ShellPlace bulge;
   };
 
-  /// As if directions were the plane's normal.
+  /// As if all directions were their mean.
   [[nodiscard]] ShellPlace guess(double t) const noexcept {
     const Vec3 there = part_.start + t * part_.rate;
-    return {there.x(), there.y(), there.z()};
+    return {there.x() - part_.shear.x() * there.z(), there.y() - part_.shear.y() * there.z(), there.z() / part_.rise};
   }
 
   Moment at(double t, const ShellPlace& near) const noexcept {
