@@ -216,6 +216,30 @@ TEST_P(Budget, ItMakesNoJumpLarger) {
   EXPECT_LE(with, without + stiffness * stride);
 }
 
+TEST(BudgetOfATick, a_probe_drawn_back_onto_the_surface_is_not_flown_to_and_fro) {
+  // To within rounding of it: the walk says that it has left, the flight that it has not.
+  Rng rng(5);
+  const Scene scene = scene_of_kind(0, 0);
+  const auto pressed = [&](const Vec3& out, ProxyState& state) {
+    touch(scene, state, 1.2 * size * out);
+    return touch(scene, state, rng.uniform(0.8, 0.93) * size * out);
+  };
+  std::uint32_t most = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 out = random_direction(rng);
+    ProxyState aside;
+    const ForceSample there = pressed((out + 0.02 * random_vector(rng, 1.0)).normalized(), aside);
+    ProxyState state;
+    ProxyCache cache;
+    pressed(out, state);
+    const double off = std::exp(rng.uniform(std::log(1e-18), std::log(1e-12))) * (rng.below(2) == 0 ? 1.0 : -1.0);
+    const ForceSample felt = step(scene, state, cache, probe_at(there.proxy + off * there.contact.normal), tick);
+    EXPECT_FALSE(unfinished(felt.flags)) << i;
+    most = std::max(most, cache.work().done().sum());
+  }
+  EXPECT_LE(most, 250U);
+}
+
 RC_GTEST_PROP(BudgetInvariants, the_proxy_never_moves_away_from_the_probe, (std::uint64_t seed)) {
   Rng rng(seed);
   const std::size_t kind = rng.below(std::size(kinds));

@@ -48,6 +48,11 @@ class PointProxy {
         rest.pulls = true;
         return rest;
       }
+      // Nothing is between: a flight from a skin off would come back to where the probe is all but on the surface.
+      if (end == DescentEnd::left && (probe_ - spot_.point).norm() <= view_.skin()) {
+        leave();
+        return free();
+      }
       Vec3 start;
       // Where there is no place to fly from it stays.
       if (!view_.launch(place_, spot_, start)) return resting(true);
@@ -73,10 +78,14 @@ class PointProxy {
 
   [[nodiscard]] Vec3 normal() const noexcept { return place_.side() * spot_.front; }
 
-  /// Straight to the probe through free space. False when nothing is in the way.
-  bool fly(const Vec3& from) noexcept {
+  void leave() noexcept {
     state_.rests = state_.sliding = false;
     if constexpr (may_overlap) flanks_.clear();
+  }
+
+  /// Straight to the probe through free space. False when nothing is in the way.
+  bool fly(const Vec3& from) noexcept {
+    leave();
     const SweptHit hit = view_.first_touch({from, probe_}, sides_);
     if (!hit.hit || hit.contact.normal.isZero()) return false;
     take(hit);
