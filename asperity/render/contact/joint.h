@@ -44,6 +44,9 @@ class JointSolve {
   [[nodiscard]] bool complete() const noexcept;
   /// Tells the contact of entry `index` where it is touched, or nearest. [servo]
   void remember_places(std::size_t index, const ConstraintSolution& solution) noexcept;
+  /// A place where a point is held, a skin off what holds it where nothing else is in the way: from there it may fly.
+  /// [servo]
+  [[nodiscard]] Vec3 lifted(const Vec3& position) noexcept;
 
  private:
   struct Entry {
@@ -108,7 +111,6 @@ class JointSolve {
   [[nodiscard]] bool slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::size_t& stopped) noexcept;
   [[nodiscard]] bool along_crease(std::size_t which, std::size_t stopped, const Vec3& goal, const PlaneSet& planes,
                                   PlaneProjection& projection) const noexcept;
-  [[nodiscard]] Vec3 lifted(const Vec3& position) noexcept;
   [[nodiscard]] bool fly(const Vec3& goal, Vec3& proxy) noexcept;
   [[nodiscard]] Along along(const PlaneSet& planes, const PlaneProjection& projection, const PlaneSet& also,
                             const Vec3& position, bool whole) const noexcept;

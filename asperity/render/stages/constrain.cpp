@@ -153,7 +153,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     state.sliding = false;
     solution = joint.solve(from, goal);
   }
-  state.proxy = solution.proxy;
+  state.proxy = joint.lifted(solution.proxy);
   tick.converged = solution.converged && joint.complete();
   // While friction holds it, the proxy is where it is, not where the goal would have it.
   tick.felt = solution.settled() ? Vec3(solution.projection.point) : solution.proxy;
