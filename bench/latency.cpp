@@ -41,8 +41,9 @@ void say(const std::string& what) {
   if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:<60}", what);
 }
 
-Status measure_all(const Options& options, Report& report) {
-  Effort effort{options.updates, options.cold_updates, 5};
+/// What is measured, and how large.
+struct Sizes {
+  Effort effort;
   std::vector<int> meshes = {3, 5, 6, 7, 8};
   std::vector<int> reliefs = {0, 3, 5, 6, 8};
   std::vector<std::uint32_t> volumes = {32, 64, 128, 256, 512};
@@ -50,87 +51,101 @@ Status measure_all(const Options& options, Report& report) {
   std::vector<int> fine = {3};
   std::vector<std::uint32_t> moved = {1000, 10000, 100000, 327000};
   int map_size = 1024;
+};
+
+bool asked(const Options& options, const char* kind) {
+  return options.only.empty() || options.only == kind;
+}
+
+Sizes sizes_for(const Options& options) {
+  Sizes sizes{.effort = {options.updates, options.cold_updates, 5}};
   if (options.quick) {
-    effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
-    meshes = {3, 5, 6};
-    reliefs = {0, 3, 6};
-    volumes = {32, 64, 128};
-    potentials = {3, 4, 5};
-    moved = {1000, 10000};
-    map_size = 256;
+    sizes.effort = {std::min<std::size_t>(options.updates, 10000), std::min<std::size_t>(options.cold_updates, 10), 5};
+    sizes.meshes = {3, 5, 6};
+    sizes.reliefs = {0, 3, 6};
+    sizes.volumes = {32, 64, 128};
+    sizes.potentials = {3, 4, 5};
+    sizes.moved = {1000, 10000};
+    sizes.map_size = 256;
   }
   if (options.counted > 0) {
     // Under a tool that counts, everything is tens of times slower.
-    effort = {std::max<std::size_t>(100, options.counted / 4), 0, 1, options.counted};
-    meshes = {3, 5, 6};
-    reliefs = {3};
-    volumes = {64};
-    potentials = {3};
-    moved = {};
-    map_size = 256;
+    sizes.effort = {std::max<std::size_t>(100, options.counted / 4), 0, 1, options.counted};
+    sizes.meshes = {3, 5, 6};
+    sizes.reliefs = {3};
+    sizes.volumes = {64};
+    sizes.potentials = {3};
+    sizes.moved = {};
+    sizes.map_size = 256;
   }
-  const auto asked = [&](const char* kind) { return options.only.empty() || options.only == kind; };
-  if (!asked("mesh")) meshes.clear();
-  if (!asked("relief")) reliefs.clear();
-  if (!asked("volume")) volumes.clear();
-  if (!asked("potential")) potentials.clear();
-  if (!asked("fine")) fine.clear();
-  if (!asked("refit")) moved.clear();
-  for (const int subdivisions : meshes) {
+  if (!asked(options, "mesh")) sizes.meshes.clear();
+  if (!asked(options, "relief")) sizes.reliefs.clear();
+  if (!asked(options, "volume")) sizes.volumes.clear();
+  if (!asked(options, "potential")) sizes.potentials.clear();
+  if (!asked(options, "fine")) sizes.fine.clear();
+  if (!asked(options, "refit")) sizes.moved.clear();
+  return sizes;
+}
+
+Status measure_ray_rows(const Options& options, Report& report) {
+  RayEffort rays;
+  if (options.quick) {
+    rays.width = 60;
+    rays.height = 40;
+    rays.pictures = 2;
+    rays.most_triangles = std::size_t{1} << 19U;
+    rays.map_size = 64;
+    rays.sphere_alone = true;
+  }
+  rays.data = options.real.data;
+  rays.only = options.real.only;
+  const auto told = [](std::string_view what) { fmt::print(stderr, "{}\n", what); };
+  ASPERITY_TRY(report.rays, measure_rays(rays, report.clock_cost, told));
+  if (options.only == "rays" && report.rays.empty())
+    return bad_value("leaves no body to cast rays on", "--rows", "part of a name that a run without it prints");
+  return success();
+}
+
+Status measure_all(const Options& options, Report& report) {
+  const Sizes sizes = sizes_for(options);
+  for (const int subdivisions : sizes.meshes) {
     say(fmt::format("icosphere of {} triangles", 20 << (2 * subdivisions)));
-    ASPERITY_TRY(Group group, measure_mesh(subdivisions, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_mesh(subdivisions, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  for (const int subdivisions : reliefs) {
+  for (const int subdivisions : sizes.reliefs) {
     say(fmt::format("relief on {} triangles", 20 << (2 * subdivisions)));
-    ASPERITY_TRY(Group group, measure_relief(subdivisions, map_size, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_relief(subdivisions, sizes.map_size, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  for (const std::uint32_t count : volumes) {
+  for (const std::uint32_t count : sizes.volumes) {
     say(fmt::format("volume of {}^3 samples", count));
-    ASPERITY_TRY(Group group, measure_volume(count, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_volume(count, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  for (const int subdivisions : potentials) {
+  for (const int subdivisions : sizes.potentials) {
     say(fmt::format("potential of {} triangles", 20 << (2 * subdivisions)));
-    ASPERITY_TRY(Group group, measure_potential(subdivisions, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_potential(subdivisions, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  for (const int subdivisions : fine) {
+  for (const int subdivisions : sizes.fine) {
     say(fmt::format("texture and friction on {} triangles", 20 << (2 * subdivisions)));
-    ASPERITY_TRY(Group group, measure_fine(subdivisions, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_fine(subdivisions, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  if (asked("formula")) {
+  if (asked(options, "formula")) {
     say("spheres by formula");
-    ASPERITY_TRY(Group group, measure_formula(effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_formula(sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
-  for (const std::uint32_t triangles : moved) {
+  for (const std::uint32_t triangles : sizes.moved) {
     say(fmt::format("moving {} triangles", triangles));
-    ASPERITY_TRY(Group group, measure_refit(triangles, effort, report.clock_cost));
+    ASPERITY_TRY(Group group, measure_refit(triangles, sizes.effort, report.clock_cost));
     report.groups.push_back(std::move(group));
   }
   say("");
   say("\r");
-  if (asked("rays") && options.counted == 0) {
-    RayEffort rays;
-    if (options.quick) {
-      rays.width = 60;
-      rays.height = 40;
-      rays.pictures = 2;
-      rays.most_triangles = std::size_t{1} << 19U;
-      rays.map_size = 64;
-      rays.sphere_alone = true;
-    }
-    rays.data = options.real.data;
-    rays.only = options.real.only;
-    const auto told = [](std::string_view what) { fmt::print(stderr, "{}\n", what); };
-    ASPERITY_TRY(report.rays, measure_rays(rays, report.clock_cost, told));
-    if (options.only == "rays" && report.rays.empty())
-      return bad_value("leaves no body to cast rays on", "--rows", "part of a name that a run without it prints");
-  }
-  return success();
+  return asked(options, "rays") && options.counted == 0 ? measure_ray_rows(options, report) : success();
 }
 
 /// The counted rows one a line in the order in which they ran, for scripts/instructions. Answers the exit code.

@@ -126,6 +126,48 @@ double wall_at(const Box& bounds) {
   return bounds.centre().x() + 0.05 * bounds.extent().x();
 }
 
+/// What a stroke does in one tick.
+struct Motion {
+  double speed = 0.01;  ///< m/s
+  double depth = 1e-3;  ///< m
+  double turn = 0.0;    ///< rad/s
+};
+
+Motion motion_of(const std::string& stroke, std::size_t tick, double highest, Rng& rng) {
+  const double time = dt * static_cast<double>(tick);
+  Motion motion{.turn = 0.3 * std::sin(0.7 * time)};
+  if (stroke == "raster") {
+    motion.speed = 0.05;
+    motion.depth = 0.5e-3;
+    // To and fro over 10 mm, with a turn of half a circle in 20 ticks.
+    if (tick % 200 < 20) motion.turn = std::numbers::pi / (20.0 * dt) * (tick / 200 % 2 == 0 ? 1.0 : -1.0);
+  } else if (stroke == "spiral") {
+    motion.speed = 0.1;
+    motion.depth = 0.7e-3;
+    motion.turn = motion.speed / (1e-3 + 2e-3 * std::fmod(time, 5.0));
+  } else if (stroke == "walk with slips") {
+    motion.speed = 0.1 * (1.0 + std::sin(3.1 * time));
+    motion.depth = 0.5e-3 + 1e-3 * std::sin(11.0 * time);
+    motion.turn = 40.0 * rng.uniform(-1.0, 1.0);
+  } else if (stroke == "pokes 2 m/s") {
+    motion.speed = 0.02;
+    // Down from 4 mm above by 2 mm a tick to 4 mm below, held for a while, and up again.
+    const std::size_t step = tick % 40;
+    const auto in = static_cast<double>(step);
+    const double down = step < 5 ? 2e-3 * in : (step < 35 ? 8e-3 : 2e-3 * (39.0 - in));
+    motion.depth = down - 4e-3;
+  } else if (stroke == "sweep 0.5") {
+    motion.speed = 0.5;
+    motion.depth = 0.7e-3;
+  } else if (stroke == "sweep 5 m/s") {
+    motion.speed = 5.0;
+  } else if (stroke == "free flight") {
+    motion.speed = 0.05;
+    motion.depth = -highest - 1e-3;
+  }
+  return motion;
+}
+
 /// Where the probe is at each tick. Places move along the carrier; the normal that depths are measured by follows
 /// slowly, so that facets are not felt in the probe's own path.
 std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highest, std::size_t ticks,
@@ -155,40 +197,7 @@ std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highes
   int stuck = 0;
   std::size_t begun = 0;
   for (std::size_t tick = 0; tick < ticks; ++tick) {
-    const double time = dt * static_cast<double>(tick);
-    double speed = 0.01;
-    double depth = 1e-3;
-    double turn = 0.3 * std::sin(0.7 * time);  // rad/s
-    if (stroke == "raster") {
-      speed = 0.05;
-      depth = 0.5e-3;
-      // To and fro over 10 mm, with a turn of half a circle in 20 ticks.
-      if (tick % 200 < 20) turn = std::numbers::pi / (20.0 * dt) * (tick / 200 % 2 == 0 ? 1.0 : -1.0);
-    } else if (stroke == "spiral") {
-      speed = 0.1;
-      depth = 0.7e-3;
-      turn = speed / (1e-3 + 2e-3 * std::fmod(time, 5.0));
-    } else if (stroke == "walk with slips") {
-      speed = 0.1 * (1.0 + std::sin(3.1 * time));
-      depth = 0.5e-3 + 1e-3 * std::sin(11.0 * time);
-      turn = 40.0 * rng.uniform(-1.0, 1.0);
-    } else if (stroke == "pokes 2 m/s") {
-      speed = 0.02;
-      // Down from 4 mm above by 2 mm a tick to 4 mm below, held for a while, and up again.
-      const std::size_t step = tick % 40;
-      const auto in = static_cast<double>(step);
-      const double down = step < 5 ? 2e-3 * in : (step < 35 ? 8e-3 : 2e-3 * (39.0 - in));
-      depth = down - 4e-3;
-    } else if (stroke == "sweep 0.5") {
-      speed = 0.5;
-      depth = 0.7e-3;
-    } else if (stroke == "sweep 5 m/s") {
-      speed = 5.0;
-      depth = 1e-3;
-    } else if (stroke == "free flight") {
-      speed = 0.05;
-      depth = -highest - 1e-3;
-    }
+    const auto [speed, depth, turn] = motion_of(stroke, tick, highest, rng);
     heading = std::cos(turn * dt) * heading + std::sin(turn * dt) * normal.cross(heading);
     const Carrier::Spot next = carrier.nearest(spot.point + speed * dt * heading);
     // At a rim, or in a fold that it does not leave: another way; in the end somewhere else, from above.

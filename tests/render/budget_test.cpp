@@ -222,7 +222,9 @@ TEST(BudgetOfATick, a_probe_drawn_back_onto_the_surface_is_not_flown_to_and_fro)
   const Scene scene = scene_of_kind(0, 0);
   const auto pressed = [&](const Vec3& out, ProxyState& state) {
     touch(scene, state, 1.2 * size * out);
-    return touch(scene, state, rng.uniform(0.8, 0.93) * size * out);
+    const ForceSample felt = touch(scene, state, rng.uniform(0.8, 0.93) * size * out);
+    EXPECT_TRUE(felt.flags.has(TickFlag::contact));
+    return felt;
   };
   std::uint32_t most = 0;
   for (int i = 0; i < 20000; ++i) {

@@ -198,26 +198,94 @@ struct Tally {
   std::uint64_t asked = 0;  ///< of the oracle that leads a tip
 };
 
+/// What is felt along one stroke, judged tick by tick.
+class Judge {
+ public:
+  Judge(const Bodies& bodies, double friction, Tally& tally) : bodies_(bodies), friction_(friction), tally_(tally) {}
+  /// What was wrong first, or nothing.
+  [[nodiscard]] const std::string& wrong() const { return wrong_; }
+
+  void judge(Rng& rng, const Vec3& probe, const ForceSample& sample) {
+    if (!bodies_.known(probe) || !bodies_.known(sample.proxy)) {
+      held_since_.reset();
+      return;
+    }
+    const double force = sample.wrench.force.norm();
+    const double inside = -bodies_.clearance(sample.proxy);
+    if (inside > tolerance_) {
+      ++tally_.through;
+      tell("through", inside, probe, sample);
+    }
+    const double depth = -bodies_.clearance(probe);
+    if (force < test::stiffness * (depth - tolerance_) - 1e-9) {
+      ++tally_.lost;
+      tell("lost", depth - force / test::stiffness, probe, sample);
+    }
+    if (within(force, std::max(0.0, depth))) {
+      held_since_.reset();
+      return;
+    }
+    // What has been judged once is judged again where it changes, and now and then.
+    if (!held_since_ && std::abs(force - judged_) < 0.1 * judged_ && rng.below(16) != 0) return;
+    judged_ = force;
+    ++tally_.asked;
+    // A barrier may be passed a little late.
+    constexpr double late = 30e-6;
+    const double left = least_left(sample.proxy, probe, force);
+    if (within(force, left)) {
+      held_since_.reset();
+    } else if (!held_since_) {
+      held_since_ = probe;
+    } else if ((probe - *held_since_).norm() > late) {
+      ++tally_.stuck;
+      tell("stuck", force / test::stiffness - left, probe, sample);
+    }
+  }
+
+ private:
+  /// Whether a proxy that cannot come nearer than `left` (m) may press with as much.
+  [[nodiscard]] bool within(double force, double left) const {
+    const double most = 1.5 * std::sqrt(1.0 + 1.44 * friction_ * friction_);
+    return force <= test::stiffness * (most * left + 4.0 * tolerance_);
+  }
+  /// How far from the probe a tip that is led there by small strides stays, or may stay (m). The dearest is asked last.
+  [[nodiscard]] double least_left(const Vec3& proxy, const Vec3& probe, double force) const {
+    const double held = (proxy - probe).norm();
+    if (friction_ > 0.0 && bodies_.may_stick(proxy, probe, 1.2 * friction_)) return held;
+    const double left = (bodies_.led(proxy, probe) - probe).norm();
+    if (within(force, left)) return left;
+    // Over the brink of a face no step leads nearer at first.
+    constexpr double off_brink = 30e-6;
+    const double near = (bodies_.led(proxy, probe, 0.2e-6, off_brink, 0.05) - probe).norm();
+    return near > held - off_brink ? held : left;
+  }
+  void tell(const char* what, double size, const Vec3& probe, const ForceSample& sample) {
+    if (!wrong_.empty()) return;
+    std::ostringstream text;
+    text << what << " by " << size << " at tick " << tally_.ticks << ", probe " << probe.transpose() << ", proxy "
+         << sample.proxy.transpose() << ", force " << sample.wrench.force.transpose() << ", converged "
+         << !unfinished(sample.flags) << ", proxy outside by" << bodies_.clearances(sample.proxy);
+    wrong_ = text.str();
+  }
+
+  const Bodies& bodies_;
+  double friction_;
+  Tally& tally_;
+  double tolerance_ = 5e-6 + bodies_.error();
+  double judged_ = 0.0;
+  std::optional<Vec3> held_since_;
+  std::string wrong_;
+};
+
 /// One stroke of many; answers what was wrong first, or nothing.
 std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally) {
-  const double tolerance = 5e-6 + bodies.error();
   ProxyState state;
   ProxyCache cache;
-  std::string wrong;
-  const auto tell = [&](const char* what, double size, const Vec3& probe, const ForceSample& sample) {
-    if (!wrong.empty()) return;
-    std::ostringstream text;
-    text << what << " by " << size << " at tick " << tally.ticks << ", probe " << probe.transpose() << ", proxy "
-         << sample.proxy.transpose() << ", force " << sample.wrench.force.transpose() << ", converged "
-         << !unfinished(sample.flags) << ", proxy outside by" << bodies.clearances(sample.proxy);
-    wrong = text.str();
-  };
   Vec3 probe = bodies.at_clearance(rng, bodies.junction(), 4e-3, 1e-3);
   if (bodies.clearance(probe) < 0.5e-3) return {};
   test::touch(bodies.scene(), state, probe);
-  double judged = 0.0;
-  std::optional<Vec3> held_since;
-  for (int leg = 0; leg < 12; ++leg) {
+  Judge judge(bodies, friction, tally);
+  for (int leg = 0; leg < 12 && judge.wrong().empty(); ++leg) {
     const double speed = std::exp(rng.uniform(std::log(0.01), std::log(5.0)));
     const Vec3 target = bodies.target(rng, probe);
     const double length = (target - probe).norm();
@@ -230,57 +298,11 @@ std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally
       probe = next;
       const ForceSample sample = step(bodies.scene(), state, cache, told, test::tick);
       ++tally.ticks;
-      const double force = sample.wrench.force.norm();
-      if (force > 0.0) ++tally.touching;
-      if (!bodies.known(probe) || !bodies.known(sample.proxy)) {
-        held_since.reset();
-        continue;
-      }
-      const double inside = -bodies.clearance(sample.proxy);
-      if (inside > tolerance) {
-        ++tally.through;
-        tell("through", inside, probe, sample);
-      }
-      const double depth = -bodies.clearance(probe);
-      if (force < test::stiffness * (depth - tolerance) - 1e-9) {
-        ++tally.lost;
-        tell("lost", depth - force / test::stiffness, probe, sample);
-      }
-      const double most = 1.5 * std::sqrt(1.0 + 1.44 * friction * friction);
-      if (force > test::stiffness * (most * std::max(0.0, depth) + 4.0 * tolerance)) {
-        // What has been judged once is judged again where it changes, and now and then.
-        if (!held_since && std::abs(force - judged) < 0.1 * judged && rng.below(16) != 0) continue;
-        judged = force;
-        ++tally.asked;
-        const double held = (sample.proxy - probe).norm();
-        const auto within = [&](double left) { return force <= test::stiffness * (most * left + 4.0 * tolerance); };
-        // Over the brink of a face no step leads nearer at first.
-        constexpr double off_brink = 30e-6;
-        const auto on_brink = [&] {
-          return (bodies.led(sample.proxy, probe, 0.2e-6, off_brink, 0.05) - probe).norm() > held - off_brink;
-        };
-        // The dearest last.
-        double left = held;
-        const bool may_rest =
-            within(held) && ((friction > 0.0 && bodies.may_stick(sample.proxy, probe, 1.2 * friction)) ||
-                             within(left = (bodies.led(sample.proxy, probe) - probe).norm()) || on_brink());
-        // A barrier may be passed a little late.
-        constexpr double late = 30e-6;
-        if (may_rest) {
-          held_since.reset();
-        } else if (!held_since) {
-          held_since = probe;
-        } else if ((probe - *held_since).norm() > late) {
-          ++tally.stuck;
-          tell("stuck", force / test::stiffness - left, probe, sample);
-        }
-      } else {
-        held_since.reset();
-      }
+      if (sample.wrench.force.norm() > 0.0) ++tally.touching;
+      judge.judge(rng, probe, sample);
     }
-    if (!wrong.empty()) break;
   }
-  return wrong;
+  return judge.wrong();
 }
 
 /// Ten strokes over one scene, all drawn from the two numbers. What was wrong, told. `first`: what the scene begins

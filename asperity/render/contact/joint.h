@@ -44,9 +44,11 @@ class JointSolve {
   [[nodiscard]] bool complete() const noexcept;
   /// Tells the contact of entry `index` where it is touched, or nearest. [servo]
   void remember_places(std::size_t index, const ConstraintSolution& solution) noexcept;
-  /// A place where a point is held, a skin off what holds it where nothing else is in the way: from there it may fly.
-  /// [servo]
-  [[nodiscard]] Vec3 lifted(const Vec3& position) noexcept;
+  /// Where a point begins that the last tick has left at `position`: on what it touches there. A skin off it may be
+  /// behind another surface. [servo]
+  [[nodiscard]] Vec3 put_down(const Vec3& position) noexcept;
+  /// A place where a point is held, a skin off what holds it: from there it may fly. [servo]
+  [[nodiscard]] Vec3 lifted(const Vec3& position) const noexcept;
 
  private:
   struct Entry {

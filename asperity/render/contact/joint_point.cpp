@@ -25,15 +25,6 @@ bool nearer(const Vec3& now, const Vec3& before, const Vec3& goal) noexcept {
   return (now - goal).squaredNorm() < (before - goal).squaredNorm() * (1.0 - least_gain);
 }
 
-/// Of a step along a crease that bends, after which it is no nearer: how much of it a parabola through what is known of
-/// it has at its nearest.
-double nearest_share(const Vec3& from, const Vec3& to, const Vec3& step, const Vec3& goal) noexcept {
-  const double distance = (from - goal).norm();
-  const double gain = (goal - from).dot(step) / distance;
-  const double lost = (to - goal).norm() - distance;
-  return std::clamp(0.5 * gain / (gain + lost), 0.0, 0.5);
-}
-
 }  // namespace
 
 /// Whether a point is where a place is. Walks find that to within a share of the grain, along the surface.
@@ -285,20 +276,30 @@ bool JointSolve::slide(std::size_t which, const Vec3& goal, Vec3& proxy, std::si
   return false;
 }
 
-/// A little off what it is held to, as far as nothing else is in the way.
-Vec3 JointSolve::lifted(const Vec3& position) noexcept {
+Vec3 JointSolve::put_down(const Vec3& position) noexcept {
+  if (!leads_point()) return position;
+  attach(position);
+  Vec3 down = position;
+  for (const Held& held : held_) {
+    const double above = held.normal.dot(down - held.point);
+    down -= std::clamp(above, 0.0, entries_[held.owner].skin) * held.normal;
+  }
+  return down;
+}
+
+Vec3 JointSolve::lifted(const Vec3& position) const noexcept {
   Vec3 out = position;
   for (const Held& held : held_) {
     const double skin = entries_[held.owner].skin;
     out += std::max(0.0, skin - held.normal.dot(out - held.point)) * held.normal;
   }
-  const Met met = first_met({position, out}, held_, held_);
-  return met.hit ? Vec3(position + 0.5 * met.t * (out - position)) : out;
+  return out;
 }
 
 /// Straight to the goal through free space. Whether it got there.
 bool JointSolve::fly(const Vec3& goal, Vec3& proxy) noexcept {
-  const Vec3 start = lifted(proxy);
+  Vec3 start = lifted(proxy);
+  if (first_met({proxy, start}, held_, held_).hit) start = proxy;
   held_.clear();
   const Met met = first_met({start, goal}, {}, {});
   if (!met.hit) {
@@ -385,8 +386,10 @@ JointSolve::Move JointSolve::step_between(const PlaneSet& planes, const PlanePro
     const bool good = meet && nearer(next, proxy, goal);
     whole = false;
     if (meet && !good && attempt + 1 < most_attempts) {
-      step *= nearest_share(proxy, next, step, goal);
-      if (!(step.norm() > tolerance_)) return along.pressed ? Move::rest : Move::none;
+      const double distance = (proxy - goal).norm();
+      const double gain = (goal - proxy).dot(step) / distance;
+      if (gain > 0.0) step *= nearest_share(gain, (next - goal).norm() - distance);
+      if (!(gain > 0.0 && step.norm() > tolerance_)) return along.pressed ? Move::rest : Move::none;
       continue;
     }
     if (good && clear_of_others(along, next, after)) {

@@ -54,6 +54,12 @@ inline Vec3 onto_plane(const Vec3& goal, const ConstraintPlane& plane) noexcept 
 /// anywhere, where they all but agree in direction. [servo]
 bool onto_all(const PlaneSet& planes, Vec3& p) noexcept;
 
+/// Of a step along what bends: the share of it after which a parabola is nearest, by what the step would gain to first
+/// order (m, above 0) and what it has lost instead (m; below 0: gained). At most a half. [servo]
+inline double nearest_share(double gain, double lost) noexcept {
+  return 0.5 * gain / (gain + std::max(0.0, lost));
+}
+
 /// Where the proxy rests, and what holds it there.
 struct ConstraintSolution {
   Vec3 proxy = Vec3::Zero();   ///< m, one skin above what it touches

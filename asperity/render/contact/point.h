@@ -93,16 +93,13 @@ class PointProxy {
     return true;
   }
 
-  /// Whether it does not get away from where folds all but touch by flying to and fro between them.
+  /// Whether it does not get away from where it is by flying to and fro.
   [[nodiscard]] bool flies_in_vain() noexcept {
     constexpr int most_in_vain = 3;
     constexpr double least_share = 1e-3;
-    if constexpr (may_overlap) {
-      if (!view_.overlaps()) return false;
-      const double distance = (spot_.point - probe_).norm();
-      in_vain_ = distance > (1.0 - least_share) * left_at_ ? in_vain_ + 1 : 0;
-      left_at_ = distance;
-    }
+    const double distance = (spot_.point - probe_).norm();
+    in_vain_ = distance > (1.0 - least_share) * left_at_ ? in_vain_ + 1 : 0;
+    left_at_ = distance;
     return in_vain_ == most_in_vain;
   }
 

@@ -104,8 +104,7 @@ bool PointProxy<View>::search_along(const Folds& from, Vec3 step, Folds& on) noe
       if (onto_all(planes, corner)) share = std::min(0.5, (corner - spot_.point).norm() / length);
     } else if (meet) {
       // To where a parabola through what is known of it would be nearest.
-      const double lost = (probe_ - on[0].spot.point).norm() - distance;
-      share = std::clamp(0.5 * slope * length / (slope * length + std::max(0.0, lost)), 0.0, 0.5);
+      share = nearest_share(slope * length, (probe_ - on[0].spot.point).norm() - distance);
     }
     step *= share;
   }

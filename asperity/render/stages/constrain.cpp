@@ -140,6 +140,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     surface.rests = false;
   }
   if (smooth && tick.surfaces_moved) static_cast<void>(joint.push_out(from));
+  from = joint.put_down(from);
   const auto friction_in = [&](std::uint32_t owner) {
     const Touched& touch = joint.touch(owner);
     MaterialRoom room;

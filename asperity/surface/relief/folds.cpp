@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/parallel_for.h"
@@ -37,6 +38,43 @@ double fold_sine(const TriangleMesh& mesh, std::uint32_t face, int edge, std::ui
   const auto k = static_cast<std::size_t>(edge);
   const Vec3 along = (corners[(k + 1) % 3] - corners[k]).normalized();
   return -mesh.face_normal(face).cross(mesh.face_normal(other)).dot(along);
+}
+
+/// A face with its height, as a ball in a fold meets it.
+struct Wall {
+  double distance = 0.0;
+  Vec3 gradient = Vec3::Zero();
+  Vec3 normal = Vec3::Zero();
+};
+
+/// Distance from the fillet that a ball of `radius` in the fold of some walls leaves, and its gradient; from the
+/// nearest of them where the ball touches none. `skin`: length that rounding is told by (m).
+FieldSample from_fillet(std::span<const Wall> walls, double radius, const Vec3& radius_gradient, double skin) noexcept {
+  HalfSpace spaces[8];
+  for (std::size_t i = 0; i < walls.size(); ++i) spaces[i] = {walls[i].normal, radius - walls[i].distance};
+  const NearestInHalfSpaces centre = nearest_in_halfspaces({spaces, walls.size()}, 1e-12 * (radius + skin));
+  FieldSample fillet;
+  fillet.value = infinity;
+  fillet.gradient = Vec3::Zero();
+  const double away = centre.point.norm();
+  if (centre.found && away > 0.0) {
+    fillet.value = radius - away;
+    double sum = 0.0;
+    for (int k = 0; k < centre.count; ++k) {
+      const double part = centre.force[k] / away;
+      sum += part;
+      fillet.gradient += part * walls[centre.active[k]].gradient;
+    }
+    fillet.gradient += (1.0 - sum) * radius_gradient;
+    return fillet;
+  }
+  // Farther than the radius from all of them; or walls that nearly oppose each other, and no ball fits.
+  for (const Wall& wall : walls) {
+    if (wall.distance >= fillet.value) continue;
+    fillet.value = wall.distance;
+    fillet.gradient = wall.gradient;
+  }
+  return fillet;
 }
 
 // As many as make starting a thread pay.
@@ -147,6 +185,33 @@ double ReliefSurface::deepest_fold() const {
   return depth;
 }
 
+double ReliefSurface::share_across(const ReliefFrame& frame, const ShellPlace& place, const ShellGradients& gradients,
+                                   std::uint32_t other, Vec3& gradient) const noexcept {
+  const TriangleMesh& mesh = base_.mesh();
+  const TriangleMesh::Triangle& corners = mesh.triangles()[frame.face];
+  // Of the ways to the ends of the bands around common vertices and the common edge the least counts.
+  double share = 1.0;
+  const auto offer = [&](double distance, double width, const Vec2& change) {
+    if (!(distance < width * share)) return;
+    share = distance / width;
+    gradient = Vec3(change.x() * gradients.u + change.y() * gradients.v) / width;
+  };
+  for (int k = 0; k < 3; ++k) {
+    const std::uint32_t vertex = corners[static_cast<std::size_t>(k)];
+    const auto& there = mesh.triangles()[other];
+    if (there[0] != vertex && there[1] != vertex && there[2] != vertex) continue;
+    if (!(fillets_[vertex] > 0.0F)) continue;
+    offer(1.0 - coordinate(k, place.u, place.v), static_cast<double>(fillet_reach_[vertex]), -coordinate_change(k));
+  }
+  for (int edge = 0; edge < 3; ++edge) {
+    if (mesh.neighbour(frame.face, edge) != other || fold_sine(mesh, frame.face, edge, other) < -flat_fold) continue;
+    const int k = (edge + 2) % 3;
+    offer(std::max(0.0, coordinate(k, place.u, place.v)), static_cast<double>(band_to(frame.face, edge)),
+          coordinate_change(k));
+  }
+  return share;
+}
+
 FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
   const TriangleMesh& mesh = base_.mesh();
   const TriangleMesh::Triangle& corners = mesh.triangles()[frame.face];
@@ -163,11 +228,6 @@ FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPla
   // What a face that has lost its say is moved away by: more than any two faces differ.
   const double gone = 2.0 * (coat_.settings().stitching.fillet_radius + coat_.highest() - coat_.lowest());
 
-  struct Wall {
-    double distance = 0.0;
-    Vec3 gradient = Vec3::Zero();
-    Vec3 normal = Vec3::Zero();
-  };
   FixedVector<Wall, 8> walls;
   // Distance from a face with its height: its penetration, which is along the directions, measured along its normal.
   double lean = 1.0;
@@ -186,27 +246,8 @@ FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPla
     return wall;
   };
   const auto add = [&](std::uint32_t other) {
-    // Shares of the way to the ends of the bands around common vertices and the common edge; the least counts.
-    double share = 1.0;
     Vec3 share_gradient = Vec3::Zero();
-    const auto offer = [&](double distance, double width, const Vec2& change) {
-      if (!(distance < width * share)) return;
-      share = distance / width;
-      share_gradient = along(change) / width;
-    };
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t vertex = corners[static_cast<std::size_t>(k)];
-      const auto& there = mesh.triangles()[other];
-      if (there[0] != vertex && there[1] != vertex && there[2] != vertex) continue;
-      if (!(fillets_[vertex] > 0.0F)) continue;
-      offer(1.0 - coordinate(k, place.u, place.v), static_cast<double>(fillet_reach_[vertex]), -coordinate_change(k));
-    }
-    for (int edge = 0; edge < 3; ++edge) {
-      if (mesh.neighbour(frame.face, edge) != other || fold_sine(mesh, frame.face, edge, other) < -flat_fold) continue;
-      const int k = (edge + 2) % 3;
-      offer(std::max(0.0, coordinate(k, place.u, place.v)), static_cast<double>(band_to(frame.face, edge)),
-            coordinate_change(k));
-    }
+    const double share = share_across(frame, place, gradients, other, share_gradient);
     if (share >= 1.0) return;
     const ReliefFrame there = this->frame(other, frame.coat.moment);
     const Projection guess = project(frame.prism, place.u, place.v, there.prism);
@@ -224,35 +265,12 @@ FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPla
   const double own_height = height;
   if (!walls.push_back(own)) walls[walls.size() - 1] = own;
 
-  HalfSpace spaces[8];
-  for (std::size_t i = 0; i < walls.size(); ++i) spaces[i] = {walls[i].normal, radius - walls[i].distance};
-  const NearestInHalfSpaces centre = nearest_in_halfspaces({spaces, walls.size()}, 1e-12 * (radius + skin_));
-  double value = infinity;
-  Vec3 gradient = Vec3::Zero();
-  const double away = centre.point.norm();
-  if (centre.found && away > 0.0) {
-    value = radius - away;
-    double sum = 0.0;
-    for (int k = 0; k < centre.count; ++k) {
-      const double part = centre.force[k] / away;
-      sum += part;
-      gradient += part * walls[centre.active[k]].gradient;
-    }
-    gradient += (1.0 - sum) * radius_gradient;
-  } else {
-    // Farther than the radius from all of them; or walls that nearly oppose each other, and no ball fits.
-    for (const Wall& wall : walls) {
-      if (wall.distance >= value) continue;
-      value = wall.distance;
-      gradient = wall.gradient;
-    }
-  }
+  FieldSample sample = from_fillet({walls.begin(), walls.end()}, radius, radius_gradient, skin_);
   // As the face's own field beside the band: penetration along the directions.
-  FieldSample sample;
   sample.element = frame.face;
   sample.height = own_height;
-  sample.value = value / lean;
-  sample.gradient = (gradient - sample.value * lean_gradient) / lean;
+  sample.value /= lean;
+  sample.gradient = (sample.gradient - sample.value * lean_gradient) / lean;
   return sample;
 }
 

@@ -106,6 +106,24 @@ double ReliefSurface::stitched_height(const ReliefFrame& frame, double u, double
   return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
 }
 
+namespace {
+
+/// The corners of a triangle that holds what another face says of a small triangle of a face, with room for the
+/// projection's bend.
+bool corners_across(const ShellPrism& own, const Vec2 corners[3], const ShellPrism& other, Vec2 (&there)[3]) noexcept {
+  constexpr double room = 1.6;
+  Projection at[3];
+  for (int k = 0; k < 3; ++k) {
+    at[k] = project(own, corners[k].x(), corners[k].y(), other);
+    if (!at[k].seen) return false;
+  }
+  const Vec2 centre((at[0].u + at[1].u + at[2].u) / 3.0, (at[0].v + at[1].v + at[2].v) / 3.0);
+  for (int k = 0; k < 3; ++k) there[k] = centre + room * (Vec2(at[k].u, at[k].v) - centre);
+  return true;
+}
+
+}  // namespace
+
 HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]) const noexcept {
   HeightRange all = coat_.range(frame.coat, corners);
   const auto include = [&](const HeightRange& other) {
@@ -120,26 +138,12 @@ HeightRange ReliefSurface::range(const ReliefFrame& frame, const Vec2 corners[3]
     const Vec2 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
     double size = 0.0;
     for (int k = 0; k < 3; ++k) size = std::max(size, (corners[k] - middle).cwiseAbs().maxCoeff());
-    // A small triangle is projected by its corners, with room for the projection's bend; a large one may have all that
-    // the other face says anywhere.
+    // A small triangle is projected by its corners; a large one may have all that the other face says anywhere.
     constexpr double small = 0.06;
-    constexpr double room = 1.6;
     const auto add = [&](std::uint32_t other) {
       const CoatFrame coat = coat_.frame(rest_.mesh(), other, frame.coat.moment);
       Vec2 there[3] = {Vec2(-0.4, -0.4), Vec2(1.8, -0.4), Vec2(-0.4, 1.8)};
-      if (size <= small) {
-        const ShellPrism prism = shell_.prism(mesh, other);
-        Projection at[3];
-        bool seen = true;
-        for (int k = 0; k < 3; ++k) {
-          at[k] = project(frame.prism, corners[k].x(), corners[k].y(), prism);
-          seen = seen && at[k].seen;
-        }
-        if (seen) {
-          const Vec2 centre((at[0].u + at[1].u + at[2].u) / 3.0, (at[0].v + at[1].v + at[2].v) / 3.0);
-          for (int k = 0; k < 3; ++k) there[k] = centre + room * (Vec2(at[k].u, at[k].v) - centre);
-        }
-      }
+      if (size <= small) corners_across(frame.prism, corners, shell_.prism(mesh, other), there);
       include(coat_.range(coat, there));
     };
     bool in_edge = false;

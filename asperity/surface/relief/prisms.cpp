@@ -24,16 +24,15 @@ bool Prisms::contains(std::uint32_t face, const Vec3& p) const noexcept {
   std::sort(order.begin(), order.end());
   Vec3 low[3];
   Vec3 high[3];
+  Box around;
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3 offset = half_height_ * mesh_->vertex_normal(order[i]);
     low[i] = mesh_->positions()[order[i]] - offset;
     high[i] = mesh_->positions()[order[i]] + offset;
+    around.include(low[i]);
+    around.include(high[i]);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (std::min({low[0][axis], low[1][axis], low[2][axis], high[0][axis], high[1][axis], high[2][axis]}) > p[axis] ||
-        std::max({low[0][axis], low[1][axis], low[2][axis], high[0][axis], high[1][axis], high[2][axis]}) < p[axis])
-      return false;
-  }
+  if (around.distance(p) > 0.0) return false;
   return tetrahedron_contains(p, low[0], low[1], low[2], high[2]) ||
          tetrahedron_contains(p, low[0], low[1], high[1], high[2]) ||
          tetrahedron_contains(p, low[0], high[0], high[1], high[2]);

@@ -208,6 +208,9 @@ class ReliefSurface {
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] double stitched_height(const ReliefFrame& frame, double u, double v) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
+  /// How far across its band a place is towards where another face has lost its say, which is at 1.
+  [[nodiscard]] double share_across(const ReliefFrame& frame, const ShellPlace& place, const ShellGradients& gradients,
+                                    std::uint32_t other, Vec3& gradient) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
