@@ -191,9 +191,8 @@ ClosestHit Bvh::closest_from_afar(const Vec3& p, double bound) const noexcept {
   ClosestHit best;
   for (std::uint32_t face = 0; face < mesh_->triangles().size(); ++face) {
     const auto [a, b, c] = mesh_->corners(face);
-    const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
-    if (point.squared_distance <= bound * bound && point.squared_distance < best.point.squared_distance)
-      best = {face, point};
+    const ClosestHit hit{face, closest_point_on_triangle(p, a, b, c)};
+    if (hit.point.squared_distance <= bound * bound && hit.before(best)) best = hit;
   }
   return best;
 }
@@ -205,7 +204,6 @@ ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
   to_local(p, local);
   const float error = rounding(local);
   if (!(error < far_rounding)) return closest_from_afar(p, bound);
-  double best_squared = bound * bound;
   // Clamped, so that its square stays a float: no distance from here comes near.
   float limit = std::min(static_cast<float>(std::min(bound * per_scale_, 1e15)) * 1.000001F + error, 1e15F);
   Entry stack[stack_capacity];
@@ -221,12 +219,10 @@ ClosestHit Bvh::closest(const Vec3& p, double bound) const noexcept {
       for (int i = 0; i < 8; ++i) {
         if (found.distance[i] > limit || leaf.face[i] == no_index) continue;
         const auto corners = mesh_->corners(leaf.face[i]);
-        const TrianglePoint point = closest_point_on_triangle(p, corners[0], corners[1], corners[2]);
-        if (point.squared_distance > best_squared || (point.squared_distance == best_squared && best.face != no_index))
-          continue;
-        best_squared = point.squared_distance;
-        best = {leaf.face[i], point};
-        limit = static_cast<float>(std::sqrt(best_squared) * per_scale_) * 1.000001F + error;
+        const ClosestHit hit{leaf.face[i], closest_point_on_triangle(p, corners[0], corners[1], corners[2])};
+        if (hit.point.squared_distance > bound * bound || !hit.before(best)) continue;
+        best = hit;
+        limit = static_cast<float>(std::sqrt(hit.point.squared_distance) * per_scale_) * 1.000001F + error;
       }
       continue;
     }

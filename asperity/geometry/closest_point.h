@@ -61,6 +61,11 @@ inline TrianglePoint closest_point_on_triangle(const Vec3& p, const Vec3& a, con
 struct ClosestHit {
   std::uint32_t face = no_index;
   TrianglePoint point;
+  /// Whether it is nearer, or as near and of a smaller number: so that no order of asking decides.
+  [[nodiscard]] bool before(const ClosestHit& other) const noexcept {
+    return point.squared_distance < other.point.squared_distance ||
+           (point.squared_distance == other.point.squared_distance && face < other.face);
+  }
 };
 
 /// Answer of a first-hit query; face == no_index: nothing is met.

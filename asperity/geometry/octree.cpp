@@ -108,10 +108,10 @@ ClosestHit TriangleOctree::closest(const Vec3& p, double bound) const noexcept {
        [&](double key) { return !(key <= limit); },
        [&](std::uint32_t face) {
          const auto [a, b, c] = mesh_->corners(face);
-         const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
-         if (!(point.squared_distance <= limit && point.squared_distance < best.point.squared_distance)) return;
-         best = {face, point};
-         limit = point.squared_distance;
+         const ClosestHit hit{face, closest_point_on_triangle(p, a, b, c)};
+         if (!(hit.point.squared_distance <= limit && hit.before(best))) return;
+         best = hit;
+         limit = hit.point.squared_distance;
        });
   return best;
 }

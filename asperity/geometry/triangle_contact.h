@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/core/fixed_vector.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/contact.h"
 
@@ -50,7 +51,8 @@ inline Foot triangle_foot(std::uint32_t element, const TrianglePoint& at, const 
 }
 
 /// Shortens `best` to where a ball that moves along `motion` first touches triangle (a, b, c). Its distance is convex
-/// along the motion, so Newton's method from the start never passes the first touch. [servo]
+/// along the motion, so Newton's method from the start never passes the first touch. Of triangles touched at once the
+/// one of the smallest number stays, whatever the order in which they are asked. [servo]
 inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, const Vec3& c, const Segment& motion,
                            double radius, Sides sides, const ContactTolerance& tolerance, SweptHit& best) noexcept {
   constexpr int newton_limit = 32;
@@ -59,6 +61,9 @@ inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, 
   if (sides == Sides::front && cross.dot(motion.from - a) < 0.0) return;
   const double blocked = radius + (blocked_in_skins + reached_in_skins) * tolerance.skin;
   const double stopped = radius + (stopped_in_skins + reached_in_skins) * tolerance.skin;
+  const auto too_late = [&](double t) {
+    return t > best.t || (t == best.t && (!best.hit || element > best.contact.element));
+  };
   double t = 0.0;
   double t_stop = -1.0;
   TrianglePoint at_stop;
@@ -77,28 +82,51 @@ inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, 
     if (distance <= blocked) break;
     const double next = radius + (t_stop < 0.0 ? stopped_in_skins : blocked_in_skins) * tolerance.skin;
     t += (distance - next) / -slope;
-    if (t >= best.t) return;
+    // Where it is blocked need not be before what else is touched, only where it stops.
+    if (t >= 1.0 || (t_stop < 0.0 && too_late(t))) return;
   }
+  if (t_stop < 0.0) {
+    // A ball that grazes is not decided yet: up to here the way is free.
+    t_stop = t;
+    at_stop = closest_point_on_triangle(motion.from + t * direction, a, b, c);
+  }
+  if (too_late(t_stop)) return;
   best.hit = true;
-  best.t = std::max(t_stop, 0.0);
+  best.t = t_stop;
   best.contact = triangle_foot(element, at_stop, motion.from + best.t * direction, cross.normalized(), tolerance);
 }
 
-/// Adds the plane of triangle (a, b, c) if its point nearest to `position`, `point`, comes within `reach`; of one plane
-/// the nearest triangle stays. [servo]
-inline void add_triangle_contact(std::uint32_t element, const Vec3& a, const Vec3& b, const Vec3& c,
-                                 const TrianglePoint& point, const Vec3& position, double reach, Sides sides,
-                                 const ContactTolerance& tolerance, ContactSet& out) noexcept {
+/// Triangles near a place, the nearest first and equally near ones by number, in whatever order they were found; of
+/// more than fit, the nearest.
+class NearTriangles {
+ public:
+  /// Takes it where it comes within `reach` (m). [servo]
+  void offer(const ClosestHit& near, double reach) noexcept {
+    if (!(near.point.squared_distance <= reach * reach)) return;
+    std::size_t at = nearest_.size();
+    if (!nearest_.push_back(near) && !near.before(nearest_[--at])) return;
+    for (; at > 0 && near.before(nearest_[at - 1]); --at) nearest_[at] = nearest_[at - 1];
+    nearest_[at] = near;
+  }
+  [[nodiscard]] const ClosestHit* begin() const noexcept { return nearest_.begin(); }
+  [[nodiscard]] const ClosestHit* end() const noexcept { return nearest_.end(); }
+
+ private:
+  FixedVector<ClosestHit, 64> nearest_;
+};
+
+/// Adds the plane of triangle (a, b, c), whose point nearest to `position` is `near`; of one plane the triangle that
+/// was added first stays. [servo]
+inline void add_triangle_contact(const ClosestHit& near, const Vec3& a, const Vec3& b, const Vec3& c,
+                                 const Vec3& position, Sides sides, const ContactTolerance& tolerance,
+                                 ContactSet& out) noexcept {
   // Two contacts whose normals differ by less than this angle are one plane: their common line is undefined.
   constexpr double same_plane_cosine = 1.0 - 1e-10;
-  if (point.squared_distance > reach * reach) return;
   const Vec3 cross = (b - a).cross(c - a);
   if (sides == Sides::front && cross.dot(position - a) < 0.0) return;
-  const Foot contact = triangle_foot(element, point, position, cross.normalized(), tolerance);
-  for (Foot& other : out) {
-    if (contact.normal.dot(other.normal) < same_plane_cosine) continue;
-    if (contact.distance < other.distance) other = contact;
-    return;
+  const Foot contact = triangle_foot(near.face, near.point, position, cross.normalized(), tolerance);
+  for (const Foot& other : out) {
+    if (contact.normal.dot(other.normal) >= same_plane_cosine) return;
   }
   out.push_back(contact);
 }

@@ -59,16 +59,13 @@ Foot TriangleIndex::closest(const Vec3& p, double bound) const noexcept {
 Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) const noexcept {
   const Bvh* bvh = std::get_if<Bvh>(&inside_->structure);
   if (patch.owner != identity_) patch.last_face = no_index;
-  TrianglePoint best;
-  std::uint32_t best_face = no_index;
+  ClosestHit best;
   double reach = bound;
   const auto offer = [&](std::uint32_t face) {
-    const auto [a, b, c] = mesh().corners(face);
-    const TrianglePoint point = closest_point_on_triangle(p, a, b, c);
-    if (point.squared_distance >= best.squared_distance || point.squared_distance > reach * reach) return;
-    best = point;
-    best_face = face;
-    reach = std::sqrt(point.squared_distance);
+    const ClosestHit hit = near_at(face, p);
+    if (hit.point.squared_distance > bound * bound || !hit.before(best)) return;
+    best = hit;
+    reach = std::sqrt(hit.point.squared_distance);
   };
   if (patch.last_face != no_index) offer(patch.last_face);
   if (bvh != nullptr && patch.owner == identity_ && reach < patch.certified - (p - patch.centre).norm()) {
@@ -77,18 +74,18 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
       if (distance <= reach + error && face != patch.last_face) offer(face);
     });
   } else {
+    // A rounding farther, so that nothing as near as the best is beyond.
+    const double within = best.face != no_index ? reach * (1.0 + 1e-12) : reach;
     const ClosestHit hit =
-        std::visit([&](const auto& structure) { return structure.closest(p, reach); }, inside_->structure);
-    if (hit.face != no_index && hit.point.squared_distance < best.squared_distance) {
-      best = hit.point;
-      best_face = hit.face;
+        std::visit([&](const auto& structure) { return structure.closest(p, within); }, inside_->structure);
+    if (hit.before(best)) best = hit;
+    if (best.face != no_index) {
+      gather(p, std::sqrt(best.point.squared_distance) + patch_slack_in_edges * mesh().mean_edge(), patch);
     }
-    if (best_face != no_index)
-      gather(p, std::sqrt(best.squared_distance) + patch_slack_in_edges * mesh().mean_edge(), patch);
   }
-  if (best_face == no_index) return {};
-  patch.last_face = best_face;
-  return triangle_foot(best_face, best, p, mesh().face_normal(best_face), tolerance_);
+  if (best.face == no_index) return {};
+  patch.last_face = best.face;
+  return triangle_foot(best.face, best.point, p, mesh().face_normal(best.face), tolerance_);
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
@@ -138,14 +135,17 @@ bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, doubl
                               TrianglePatch& patch) const noexcept {
   const double margin = error(end);
   const double blocked = radius + blocked_in_skins * tolerance_.skin;
-  ContactSet contacts;
+  NearTriangles near;
   bool free = true;
   scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (distance > touch + margin || !free) return;
-    free = add_contact(face, end, touch, sides, contacts) > blocked * blocked;
+    const ClosestHit at = near_at(face, end);
+    free = at.point.squared_distance > blocked * blocked;
+    near.offer(at, touch);
   });
   if (!free) return false;
-  settle_edges(end, contacts);
+  ContactSet contacts;
+  touch_all(near, end, sides, contacts);
   remember(end, radius, sides, contacts, patch);
   return true;
 }
@@ -165,8 +165,8 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
                                    TrianglePatch& patch) const noexcept {
   const Vec3 direction = motion.to - motion.from;
   const double length = direction.norm();
-  const double grown = radius + stopped_in_skins * tolerance_.skin;
-  const double blocked = radius + blocked_in_skins * tolerance_.skin;
+  const double grown = radius + (stopped_in_skins + reached_in_skins) * tolerance_.skin;
+  const double blocked = radius + (blocked_in_skins + reached_in_skins) * tolerance_.skin;
   SweptHit best;
   if (length == 0.0) return best;
   const auto sweep_face = [&](std::uint32_t face) {
@@ -179,51 +179,66 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
     return length > crowded_motion_in_edges * mesh().mean_edge() && std::holds_alternative<Bvh>(inside_->structure) &&
            !ensure(motion.from, touch + length, patch);
   };
-  if (length > long_motion_in_edges * mesh().mean_edge() || crowded()) {
+  const bool long_motion = length > long_motion_in_edges * mesh().mean_edge();
+  if (!long_motion && length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) {
+    return best;
+  }
+  if (long_motion || crowded()) {
     for_each_along(motion, grown, sweep_face);
     return best;
   }
-  if (length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) return best;
   const double margin = error(motion.from);
   const auto resting_on = [&](std::uint32_t face) {
-    // What the ball rests on cannot be hit by a motion that does not go into it.
+    // What the ball rests on cannot be hit by a motion that does not go into it: it stays beyond that plane.
     if (!patch.rested || patch.rest_position != motion.from || patch.rest_radius != radius) return false;
     for (const Foot& contact : patch.rest_contacts) {
-      if (contact.element == face) return contact.distance + std::min(0.0, contact.normal.dot(direction)) >= blocked;
+      if (contact.element != face) continue;
+      const double off = contact.normal.dot(motion.from - contact.point);
+      return off + std::min(0.0, contact.normal.dot(direction)) > blocked + tolerance_.rounding;
     }
     return false;
   };
   FixedVector<std::uint32_t, 16> near_end;
   bool all_near_end = true;
   scan_ball(motion.from, touch + length, patch, [&](std::uint32_t face, double distance, const Vec3& offset) {
-    // The distance is convex: along the motion it stays above its tangent at the start.
-    const double bound =
-        distance > margin ? distance - margin + (offset.dot(direction) - margin * length) / distance : 0.0;
+    // The distance is convex: along the motion it stays above its tangent at the start. Single precision tells feet
+    // apart only by their distances, so that it may take one as far from the foot as the square root of its rounding.
+    double bound = distance > margin ? distance - margin + offset.dot(direction) / distance : 0.0;
+    if (bound > grown) {
+      const double beyond = (bound - touch) * distance;
+      if (beyond > 0.0 && beyond * beyond > 4.0 * margin * (distance + margin) * length * length) return;
+      const TrianglePoint at = near_at(face, motion.from).point;
+      const double exactly = std::sqrt(at.squared_distance);
+      bound = exactly + (motion.from - at.point).dot(direction) / exactly;
+    }
     if (bound > touch) return;
     if (bound <= grown && !resting_on(face)) sweep_face(face);
     all_near_end = near_end.push_back(face) && all_near_end;
   });
   if (!best.hit && all_near_end) {
     // What touches at the end was among them: the next question is about the contacts there.
+    NearTriangles near;
+    for (const std::uint32_t face : near_end) near.offer(near_at(face, motion.to), touch);
     ContactSet contacts;
-    for (const std::uint32_t face : near_end) add_contact(face, motion.to, touch, sides, contacts);
-    settle_edges(motion.to, contacts);
+    touch_all(near, motion.to, sides, contacts);
     remember(motion.to, radius, sides, contacts, patch);
   }
   return best;
 }
 
-double TriangleIndex::add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
-                                  ContactSet& out) const noexcept {
+ClosestHit TriangleIndex::near_at(std::uint32_t face, const Vec3& position) const noexcept {
   const auto [a, b, c] = mesh().corners(face);
-  const TrianglePoint point = closest_point_on_triangle(position, a, b, c);
-  add_triangle_contact(face, a, b, c, point, position, reach, sides, tolerance_, out);
-  return point.squared_distance;
+  return {face, closest_point_on_triangle(position, a, b, c)};
 }
 
-void TriangleIndex::settle_edges(const Vec3& position, ContactSet& contacts) const noexcept {
+void TriangleIndex::touch_all(const NearTriangles& near, const Vec3& position, Sides sides,
+                              ContactSet& out) const noexcept {
+  for (const ClosestHit& at : near) {
+    const auto [a, b, c] = mesh().corners(at.face);
+    add_triangle_contact(at, a, b, c, position, sides, tolerance_, out);
+  }
   settle_edge_contacts(
-      position, tolerance_, [&](std::uint32_t face) { return mesh().corners(face); }, contacts);
+      position, tolerance_, [&](std::uint32_t face) { return mesh().corners(face); }, out);
 }
 
 void TriangleIndex::remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
@@ -246,10 +261,11 @@ void TriangleIndex::contacts(const Vec3& position, double radius, Sides sides, T
   }
   const double reach = radius + touch_in_skins * tolerance_.skin;
   const double margin = error(position);
+  NearTriangles near;
   scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
-    if (distance <= reach + margin) add_contact(face, position, reach, sides, out);
+    if (distance <= reach + margin) near.offer(near_at(face, position), reach);
   });
-  settle_edges(position, out);
+  touch_all(near, position, sides, out);
   remember(position, radius, sides, out, patch);
 }
 

@@ -151,13 +151,11 @@ class TriangleIndex {
                                     TrianglePatch& patch) const noexcept;
   /// Whether nothing reaches into the ball at the end of a short motion; if so, remembers what it touches there.
   bool glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept;
-  /// Makes of the edges and corners among the contacts what they mean beside a touched face.
-  void settle_edges(const Vec3& position, ContactSet& contacts) const noexcept;
   void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
                 TrianglePatch& patch) const noexcept;
-  /// Answers the squared distance to the face (m^2).
-  double add_contact(std::uint32_t face, const Vec3& position, double reach, Sides sides,
-                     ContactSet& out) const noexcept;
+  [[nodiscard]] ClosestHit near_at(std::uint32_t face, const Vec3& position) const noexcept;
+  /// Adds the planes of what is near, and makes of edges and corners what they mean beside a touched face.
+  void touch_all(const NearTriangles& near, const Vec3& position, Sides sides, ContactSet& out) const noexcept;
 
   std::shared_ptr<const Inside> inside_;
   std::uint64_t identity_ = 0;

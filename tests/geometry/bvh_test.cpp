@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
+#include <string>
 
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
@@ -276,6 +278,122 @@ TEST(TriangleIndex, ContactsAreThePlanesWithinTouch) {
     EXPECT_EQ(count(Vec3(0.05 + radius + index.skin(), 0.01, 0.004), Sides::front), 1u);
     EXPECT_EQ(count(Vec3(0.06, 0.01, 0.004), Sides::front), 0u);
   }
+}
+
+Vec3 random_unit(Rng& rng) {
+  return Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)).normalized();
+}
+
+/// A place at most `apart` from a corner, an edge or the inside of one of the mesh's triangles.
+Vec3 place_on(Rng& rng, const TriangleMesh& mesh, double apart) {
+  const auto corners = mesh.corners(rng.below(static_cast<std::uint32_t>(mesh.triangles().size())));
+  Vec3 weights(rng.uniform(), rng.uniform(), rng.uniform());
+  const std::uint32_t kind = rng.below(3);
+  if (kind != 0) weights[0] = 0.0;
+  if (kind == 2) weights[1] = 0.0;
+  weights /= weights.sum();
+  return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2] + apart * random_unit(rng);
+}
+
+std::string told(const Foot& foot) {
+  std::ostringstream text;
+  text << std::hexfloat << foot.element << " at " << foot.point.transpose() << " normal " << foot.normal.transpose()
+       << " distance " << foot.distance << "\n";
+  return text.str();
+}
+
+std::string told(const ContactSet& contacts) {
+  std::string all;
+  for (const Foot& contact : contacts) all += told(contact);
+  return all;
+}
+
+std::string told(const SweptHit& hit) {
+  std::ostringstream text;
+  if (hit.hit) text << std::hexfloat << hit.t << " " << told(hit.contact);
+  return text.str();
+}
+
+// A patch is a cache: whatever it holds, an answer has the same bits. Where several triangles are as near, which is on
+// every edge and corner, the choice between them must not follow the order in which a patch lists them.
+TEST(TriangleIndex, NoAnswerDependsOnWhatAPatchHolds) {
+  Rng rng(11);
+  std::vector<TriangleMesh> all = meshes();
+  all.push_back(TriangleMesh::build(random_closed_mesh(9, 4, 0.05, 0.5)).value());
+  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  int hits = 0;
+  int several = 0;
+  for (std::size_t which = 0; which < 2 * all.size(); ++which) {
+    const auto structure = which % 2 == 0 ? SearchStructure::bvh : SearchStructure::octree;
+    const TriangleIndex index = TriangleIndex::build(all[which / 2], structure);
+    const double edge = index.mesh().mean_edge();
+    const double skin = index.skin();
+    TrianglePatch walked;
+    Vec3 position = place_on(rng, index.mesh(), skin);
+    for (int i = 0; i < 200; ++i) {
+      if (i % 20 == 0) position = place_on(rng, index.mesh(), skin);
+      const double radius = i % 3 == 0 ? edge * std::pow(10.0, rng.uniform(-2.0, 0.5)) : 0.0;
+      const Sides sides = rng.below(2) == 0 ? Sides::both : Sides::front;
+      const Vec3 to = rng.below(3) == 0 ? place_on(rng, index.mesh(), skin)
+                                        : position + edge * std::pow(10.0, rng.uniform(-6.0, 1.0)) * random_unit(rng);
+      const Segment motion{position, to};
+      const double bound = rng.below(2) == 0 ? infinity : edge;
+      TrianglePatch cold[3];
+      TrianglePatch elsewhere;
+      (void)index.closest(place_on(rng, index.mesh(), 0.3 * edge), infinity, elsewhere);
+      const std::string swept = told(index.sweep(motion, radius, sides, cold[0]));
+      EXPECT_EQ(told(index.sweep(motion, radius, sides, elsewhere)), swept) << i;
+      EXPECT_EQ(told(index.sweep(motion, radius, sides, walked)), swept) << i;
+      hits += swept.empty() ? 0 : 1;
+
+      ContactSet touched[3];
+      index.contacts(to, radius, sides, cold[1], touched[0]);
+      index.contacts(to, radius, sides, elsewhere, touched[1]);
+      index.contacts(to, radius, sides, walked, touched[2]);
+      EXPECT_EQ(told(touched[1]), told(touched[0])) << i;
+      EXPECT_EQ(told(touched[2]), told(touched[0])) << i;
+      several += touched[0].size() > 1 ? 1 : 0;
+
+      const std::string nearest = told(index.closest(to, bound));
+      EXPECT_EQ(told(index.closest(to, bound, cold[2])), nearest) << i;
+      EXPECT_EQ(told(index.closest(to, bound, elsewhere)), nearest) << i;
+      EXPECT_EQ(told(index.closest(to, bound, walked)), nearest) << i;
+      ASSERT_FALSE(testing::Test::HasFailure()) << index.mesh().triangles().size() << " triangles";
+      position = to;
+    }
+  }
+  EXPECT_GT(hits, 1000);
+  EXPECT_GT(several, 1000);
+}
+
+// What a search leaves out is not met: a motion that ends on a corner or an edge comes near it at its end alone, which
+// is what single precision, at its start, can least tell.
+TEST(TriangleIndex, SweepEqualsAskingEveryTriangle) {
+  Rng rng(12);
+  int ends = 0;
+  int missed = 0;
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleIndex index = TriangleIndex::build(mesh);
+    const ContactTolerance tolerance = ContactTolerance::of(mesh.mean_edge(), mesh.bounds());
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3 to = place_on(rng, mesh, 0.3 * index.skin());
+      const Segment motion{to + mesh.mean_edge() * std::pow(10.0, rng.uniform(-3.0, 1.0)) * random_unit(rng), to};
+      SweptHit expected;
+      for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+        const auto [a, b, c] = mesh.corners(face);
+        sweep_triangle(face, a, b, c, motion, 0.0, Sides::both, tolerance, expected);
+      }
+      TrianglePatch patch;
+      const SweptHit hit = index.sweep(motion, 0.0, Sides::both, patch);
+      missed += hit.hit != expected.hit ? 1 : 0;
+      ends += expected.hit && expected.t > 1.0 - 1e-4 ? 1 : 0;
+      if (hit.hit && expected.hit) {
+        EXPECT_LE(std::abs(hit.t - expected.t) * (motion.to - motion.from).norm(), index.skin());
+      }
+    }
+  }
+  EXPECT_EQ(missed, 0);
+  EXPECT_GT(ends, 3000);
 }
 
 TEST(SimdKernels, PlainAndBestAgree) {

@@ -154,6 +154,20 @@ TEST(ContactFriction, The_default_is_the_proxys_own_and_equals_the_law_on_top) {
   EXPECT_LT(worst, 1e-3 * push);
 }
 
+TEST(ContactFriction, A_corner_of_faces_holds_whichever_of_them_the_probe_goes_over) {
+  // The square is a grid: six faces meet where the probe comes down.
+  const Scene scene = scene_with(rough(FrictionKind::implicit_coulomb));
+  for (int direction = 0; direction < 90; ++direction) {
+    const double a = 4.0 * direction * std::numbers::pi / 180.0;
+    std::vector<Vec3> path = line({0.0, 0.0, 0.001}, {0.0, 0.0, -depth}, 10);
+    // As far as friction holds it and a little less.
+    for (int i = 1; i <= 120; ++i) path.push_back({i * 2e-6 * std::cos(a), i * 2e-6 * std::sin(a), -depth});
+    const ForceSample last = stroke(scene, path).back();
+    EXPECT_NEAR(last.proxy.head<2>().norm(), 0.0, 1e-9) << direction;
+    EXPECT_NEAR(last.wrench.force.head<2>().norm(), stiffness * 240e-6, 1e-6) << direction;
+  }
+}
+
 TEST(ContactFriction, Felt_under_every_contact_law) {
   ImplicitParts parts;
   parts.grid = test::sparse_grid([](const Vec3& p) { return p.z(); }, Box{Vec3::Constant(-0.02), Vec3::Constant(0.02)},

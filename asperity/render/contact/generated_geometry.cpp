@@ -342,11 +342,15 @@ SweptHit GeneratedPatch::segment(const Segment& motion, double radius, Sides sid
 void GeneratedPatch::contacts(const Vec3& position, double radius, Sides sides, ContactSet& out) noexcept {
   const double reach = radius + touch_in_skins * tolerance_.skin;
   if (room_around(position, reach, 0.0) < 0.0) return;
-  ContactSet found;
+  NearTriangles near;
   for (std::uint32_t facet = 0; facet < facets_.size(); ++facet) {
     const auto [a, b, c] = corners(facet);
-    add_triangle_contact(facet, a, b, c, closest_point_on_triangle(position, a, b, c), position, reach, sides,
-                         tolerance_, found);
+    near.offer({facet, closest_point_on_triangle(position, a, b, c)}, reach);
+  }
+  ContactSet found;
+  for (const ClosestHit& at : near) {
+    const auto [a, b, c] = corners(at.face);
+    add_triangle_contact(at, a, b, c, position, sides, tolerance_, found);
   }
   settle_edge_contacts(
       position, tolerance_, [&](std::uint32_t facet) { return corners(facet); }, found);

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "asperity/geometry/triangle_contact.h"
 #include "asperity/render/contact/coulomb.h"
 #include "asperity/render/contact/planes.h"
 #include "asperity/render/state.h"
@@ -31,8 +32,12 @@ class PointProxy {
     } else if constexpr (on_triangles) {
       // On an edge it is held by the edge, from wherever it came.
       if (!view_.within_face(place_)) return {.simple = false};
-      // As several planes do it: friction holds from where the probe has led it by the end of the tick.
-      if (friction_.still > 0.0) slide(0.0);
+      if (friction_.still > 0.0) {
+        // What it touches already may hold it, whichever of several faces it goes into first.
+        if ((from - spot_.point).dot(normal()) <= touch_in_skins * view_.skin()) return {.simple = false};
+        // As several planes do it: friction holds from where the probe has led it by the end of the tick.
+        slide(0.0);
+      }
     }
     for (int flight = 0; flight < most_flights; ++flight) {
       const DescentEnd end = settle();
