@@ -395,6 +395,14 @@ TEST(StrokesThatOnceFailed, lifted_off_one_surface_it_stays_before_the_next) {
   EXPECT_GT(tally.touching, 3000U);
 }
 
+// A walk over an isosurface that was cut short told the normal of the place before, and friction held by that.
+TEST(StrokesThatOnceFailed, friction_on_an_isosurface_holds_by_the_normal_where_it_stands) {
+  Tally tally;
+  std::map<std::string, int> kinds;
+  for (const std::string& wrong : strokes_over(0, 19, tally, kinds)) ADD_FAILURE() << wrong;
+  EXPECT_GT(tally.asked, 50U);
+}
+
 }  // namespace
 
 }  // namespace asperity::strokes

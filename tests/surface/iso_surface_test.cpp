@@ -190,6 +190,28 @@ TEST_P(IsoEach, DescentComesToTheNearestPointAndNeverFarther) {
   }
 }
 
+TEST(IsoSurface, DescentThatIsCutShortTellsTheNormalWhereItStands) {
+  const auto field = sphere_field(17, CellReconstruction::smooth);
+  const IsoSurface surface = IsoSurface::build(field, 0.03, Inside::low).value();
+  std::mt19937_64 generator(10);
+  int cut = 0;
+  for (int n = 0; n < 500; ++n) {
+    CellCache cells;
+    const Vec3 around = random_point(generator, 1.0).normalized() * 0.045;
+    const Vec3 goal = random_point(generator, 1.0).normalized() * 0.02;
+    const IsoCrossing start = surface.view(cells).first_crossing({around, Vec3::Zero()});
+    ASSERT_TRUE(start.found);
+    const IsoView view = surface.view(cells);
+    Place place{view.element_of(start.cell), false, start.point};
+    IsoSpot spot = view.at(place, start.outward);
+    const DescentEnd end = view.descend(place, spot, {.point = goal, .moves = 1 + n % 16});
+    if (end != DescentEnd::limited) continue;
+    ++cut;
+    EXPECT_LT((spot.front - view.outward(spot.point)).norm(), 1e-6) << n;
+  }
+  EXPECT_GT(cut, 200);
+}
+
 TEST(IsoSurface, EndsAtTheVolumesBorder) {
   const IsoSurface surface =
       IsoSurface::build(std::make_shared<const ScalarField>(

@@ -48,6 +48,8 @@ class Leader {
       if (const Step step = move(); step != Step::moved)
         return step == Step::rest ? DescentEnd::rest : step == Step::left ? DescentEnd::left : DescentEnd::rim;
     }
+    // The last move has led on from where the normal was asked for.
+    if (moves() > 0) look();
     return DescentEnd::limited;
   }
   /// Evaluations that it took.
@@ -78,6 +80,27 @@ class Leader {
         if (place.cell + 1 < axes_[a].cells()) last_[a] = place.cell + 1;
       }
     }
+  }
+
+  /// The normal where x is.
+  void look() noexcept {
+    find_cells();
+    Vec3 sum = Vec3::Zero();
+    for (std::uint32_t k = first_[2]; k <= last_[2]; ++k) {
+      for (std::uint32_t j = first_[1]; j <= last_[1]; ++j) {
+        for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) {
+          const CellPolynomial* cell = load({{i, j, k}});
+          if (cell == nullptr) continue;
+          ++moves_;
+          const Vec3 gradient = sign_ * cell->gradient(x_).gradient;
+          const double length = gradient.norm();
+          if (!(length > 0.0)) continue;
+          if (sum.isZero()) normal_ = gradient / length;
+          sum += gradient / length;
+        }
+      }
+    }
+    away_ = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : normal_;
   }
 
   /// Normal and pull along the surface from the gradient of phi. False where there is no direction.
