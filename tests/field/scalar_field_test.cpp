@@ -338,6 +338,24 @@ TEST_P(EachReconstruction, M_2_octree_excludes_no_cell_that_the_field_passes) {
   }
 }
 
+TEST_P(EachReconstruction, FourPlacesSideBySideAreEachAsAlone) {
+  std::mt19937_64 generator(9);
+  const auto field = random_field(6, GetParam(), 3, 0.8);
+  CellPolynomial cell;
+  for (int n = 0; n < 2000; ++n) {
+    ASSERT_TRUE(field->load(0, field->cell_of(0, random_point(generator, 0.05)), cell));
+    CellPolynomial::Places places;
+    Vec3 points[lanes];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      points[l] = cell.lower + (random_point(generator, 0.6).array() + 0.5).matrix().cwiseProduct(cell.width);
+      for (int a = 0; a < 3; ++a) places[static_cast<std::size_t>(a)][l] = points[l][a];
+    }
+    Lanes values;
+    cell.values(places, values);
+    for (std::size_t l = 0; l < lanes; ++l) ASSERT_NEAR(values[l], cell.value(points[l]), 1e-13);
+  }
+}
+
 TEST_P(EachReconstruction, FindsTheFirstRootOfACellLikeFineSteps) {
   std::mt19937_64 generator(8);
   int found = 0;

@@ -217,9 +217,12 @@ class Judge {
       tell("through", inside, probe, sample);
     }
     const double depth = -bodies_.clearance(probe);
-    if (force < test::stiffness * (depth - tolerance_) - 1e-9) {
+    // A force that would give back more than the hand has put in is rendered weaker, and says so: its spring is judged.
+    const bool weaker = sample.flags.has(TickFlag::energy_limited);
+    const double held = weaker ? test::stiffness * (sample.proxy - probe).norm() : force;
+    if (held < test::stiffness * (depth - tolerance_) - 1e-9) {
       ++tally_.lost;
-      tell("lost", depth - force / test::stiffness, probe, sample);
+      tell("lost", depth - held / test::stiffness, probe, sample);
     }
     if (within(force, std::max(0.0, depth))) {
       held_since_.reset();

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
+#include <limits>
 
 #if defined(__GNUC__) && defined(__x86_64__)
 // The same code once more for processors with wider registers.
@@ -16,6 +18,9 @@
 namespace asperity {
 
 namespace {
+
+using Places = CellPolynomial::Places;
+using FourLanes = double __attribute__((vector_size(lanes * sizeof(double))));
 
 template <int Degree>
 struct Basis {
@@ -82,7 +87,7 @@ ASPERITY_INLINE FieldJet evaluate(const CellPolynomial& cell, const Vec3& p) noe
   constexpr std::size_t plane = row * row;
   Basis<Degree> b[3];
   for (int a = 0; a < 3; ++a) {
-    const double scale = 1.0 / cell.width[a];
+    const double scale = cell.per_width[a];
     bernstein<Degree, Order>((p[a] - cell.lower[a]) * scale, scale, b[a]);
   }
   FieldJet out;
@@ -119,8 +124,48 @@ ASPERITY_INLINE FieldJet evaluate(const CellPolynomial& cell, const Vec3& p) noe
   return out;
 }
 
+/// At four places side by side, each by the same operations in the same order as alone: a start that is on the surface
+/// to rounding must be on the same side of it by both.
+template <int Degree>
+ASPERITY_INLINE void evaluate_four(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
+  constexpr int n = Degree + 1;
+  constexpr auto row = static_cast<std::size_t>(n);
+  constexpr std::size_t plane = row * row;
+  FourLanes weight[3][row];
+  for (int a = 0; a < 3; ++a) {
+    FourLanes u;
+    std::memcpy(&u, &places[static_cast<std::size_t>(a)], sizeof(u));
+    u = (u - cell.lower[a]) * cell.per_width[a];
+    const FourLanes w = 1.0 - u;
+    if constexpr (Degree == 1) {
+      weight[a][0] = w;
+      weight[a][1] = u;
+    } else {
+      weight[a][0] = w * w * w;
+      weight[a][1] = 3.0 * u * w * w;
+      weight[a][2] = 3.0 * u * u * w;
+      weight[a][3] = u * u * u;
+    }
+  }
+  FourLanes in_plane[plane];
+  for (std::size_t i = 0; i < plane; ++i) {
+    in_plane[i] = weight[2][0] * cell.coefficient[i];
+    for (std::size_t k = 1; k < row; ++k) in_plane[i] += weight[2][k] * cell.coefficient[plane * k + i];
+  }
+  FourLanes sum = {};
+  for (std::size_t i = 0; i < row; ++i) {
+    FourLanes in_row = weight[1][0] * in_plane[i];
+    for (std::size_t k = 1; k < row; ++k) in_row += weight[1][k] * in_plane[row * k + i];
+    sum += weight[0][i] * in_row;
+  }
+  std::memcpy(&values, &sum, sizeof(sum));
+}
+
 double cubic_value(const CellPolynomial& cell, const Vec3& p) noexcept {
   return evaluate<3, 0>(cell, p).value;
+}
+void cubic_values(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
+  evaluate_four<3>(cell, places, values);
 }
 FieldJet cubic_gradient(const CellPolynomial& cell, const Vec3& p) noexcept {
   return evaluate<3, 1>(cell, p);
@@ -132,6 +177,10 @@ FieldJet cubic_jet(const CellPolynomial& cell, const Vec3& p) noexcept {
 [[gnu::target("avx2,fma")]] double cubic_value_wide(const CellPolynomial& cell, const Vec3& p) noexcept {
   return evaluate<3, 0>(cell, p).value;
 }
+[[gnu::target("avx2,fma")]] void cubic_values_wide(const CellPolynomial& cell, const Places& places,
+                                                   Lanes& values) noexcept {
+  evaluate_four<3>(cell, places, values);
+}
 [[gnu::target("avx2,fma")]] FieldJet cubic_gradient_wide(const CellPolynomial& cell, const Vec3& p) noexcept {
   return evaluate<3, 1>(cell, p);
 }
@@ -140,51 +189,101 @@ FieldJet cubic_jet(const CellPolynomial& cell, const Vec3& p) noexcept {
 }
 #endif
 
+/// What a cell's coefficients say of all of it.
+struct CellRanges {
+  double low = infinity;
+  double high = -infinity;
+  double sum = 0.0;
+  Vec3 step_low = Vec3::Constant(infinity);  ///< of differences of neighbours along each axis
+  Vec3 step_high = Vec3::Constant(-infinity);
+};
+
+class LaneRange {
+ public:
+  ASPERITY_INLINE void include(const FourLanes& values) noexcept {
+    least_ = values < least_ ? values : least_;
+    greatest_ = values > greatest_ ? values : greatest_;
+  }
+  ASPERITY_INLINE void tell(double& low, double& high) const noexcept {
+    for (std::size_t l = 0; l < lanes; ++l) {
+      low = least_[l] < low ? least_[l] : low;
+      high = greatest_[l] > high ? greatest_[l] : high;
+    }
+  }
+
+ private:
+  FourLanes least_ = FourLanes{} + infinity;
+  FourLanes greatest_ = FourLanes{} - infinity;
+};
+
+/// A row along x fills the lanes.
+ASPERITY_INLINE void cubic_ranges_of(const double* c, CellRanges& out) noexcept {
+  using Four = long long __attribute__((vector_size(lanes * sizeof(long long))));
+  FourLanes row[16];
+  std::memcpy(row, c, sizeof(row));
+  LaneRange all;
+  LaneRange steps[3];
+  FourLanes sum = {};
+  for (int r = 0; r < 16; ++r) {
+    all.include(row[r]);
+    sum += row[r];
+    // Three differences; the last one twice.
+    const FourLanes along = __builtin_shuffle(row[r], Four{1, 2, 3, 3}) - __builtin_shuffle(row[r], Four{0, 1, 2, 2});
+    steps[0].include(along);
+    if (r % 4 != 3) steps[1].include(row[r + 1] - row[r]);
+    if (r < 12) steps[2].include(row[r + 4] - row[r]);
+  }
+  all.tell(out.low, out.high);
+  out.sum = sum[0] + sum[1] + sum[2] + sum[3];
+  for (int a = 0; a < 3; ++a) steps[a].tell(out.step_low[a], out.step_high[a]);
+}
+
+void cubic_ranges(const double* coefficients, CellRanges& out) noexcept {
+  cubic_ranges_of(coefficients, out);
+}
+#ifdef ASPERITY_WIDE
+[[gnu::target("avx2,fma")]] void cubic_ranges_wide(const double* coefficients, CellRanges& out) noexcept {
+  cubic_ranges_of(coefficients, out);
+}
+#endif
+
+/// Of a trilinear cell.
+void linear_ranges(const double* c, CellRanges& out) noexcept {
+  const auto least = [](double p, double q) { return p < q ? p : q; };
+  const auto greatest = [](double p, double q) { return p > q ? p : q; };
+  const auto all = [&](const auto& of, double p, double q, double r, double s) { return of(of(p, q), of(r, s)); };
+  const double steps[3][4] = {{c[1] - c[0], c[3] - c[2], c[5] - c[4], c[7] - c[6]},
+                              {c[2] - c[0], c[3] - c[1], c[6] - c[4], c[7] - c[5]},
+                              {c[4] - c[0], c[5] - c[1], c[6] - c[2], c[7] - c[3]}};
+  for (int a = 0; a < 3; ++a) {
+    out.step_low[a] = all(least, steps[a][0], steps[a][1], steps[a][2], steps[a][3]);
+    out.step_high[a] = all(greatest, steps[a][0], steps[a][1], steps[a][2], steps[a][3]);
+  }
+  out.low = least(all(least, c[0], c[1], c[2], c[3]), all(least, c[4], c[5], c[6], c[7]));
+  out.high = greatest(all(greatest, c[0], c[1], c[2], c[3]), all(greatest, c[4], c[5], c[6], c[7]));
+  out.sum = ((c[0] + c[1]) + (c[2] + c[3])) + ((c[4] + c[5]) + (c[6] + c[7]));
+}
+
 /// How cubic cells are evaluated on this processor: chosen once.
 struct CubicKernels {
   double (*value)(const CellPolynomial&, const Vec3&) noexcept = cubic_value;
+  void (*values)(const CellPolynomial&, const Places&, Lanes&) noexcept = cubic_values;
   FieldJet (*gradient)(const CellPolynomial&, const Vec3&) noexcept = cubic_gradient;
   FieldJet (*jet)(const CellPolynomial&, const Vec3&) noexcept = cubic_jet;
+  void (*ranges)(const double*, CellRanges&) noexcept = cubic_ranges;
   CubicKernels() noexcept {
 #ifdef ASPERITY_WIDE
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
       value = cubic_value_wide;
+      values = cubic_values_wide;
       gradient = cubic_gradient_wide;
       jet = cubic_jet_wide;
+      ranges = cubic_ranges_wide;
     }
 #endif
   }
 };
 const CubicKernels cubic;
-
-/// Least and greatest difference of neighbours along one axis, times `scale`.
-template <int Degree, int Axis>
-inline void difference_range(const double* c, double scale, double& low, double& high) noexcept {
-  constexpr int n = Degree + 1;
-  constexpr int stride = Axis == 0 ? 1 : Axis == 1 ? n : n * n;
-  double least = infinity;
-  double greatest = -infinity;
-  for (int k = 0; k < (Axis == 2 ? Degree : n); ++k) {
-    for (int j = 0; j < (Axis == 1 ? Degree : n); ++j) {
-      for (int i = 0; i < (Axis == 0 ? Degree : n); ++i) {
-        const double* at = c + i + n * (j + n * k);
-        const double difference = at[stride] - at[0];
-        least = difference < least ? difference : least;
-        greatest = difference > greatest ? difference : greatest;
-      }
-    }
-  }
-  low = scale * least;
-  high = scale * greatest;
-}
-
-template <int Degree>
-inline void gradient_range(const CellPolynomial& cell, Vec3& low, Vec3& high) noexcept {
-  const double* c = cell.coefficient;
-  difference_range<Degree, 0>(c, Degree / cell.width[0], low[0], high[0]);
-  difference_range<Degree, 1>(c, Degree / cell.width[1], low[1], high[1]);
-  difference_range<Degree, 2>(c, Degree / cell.width[2], low[2], high[2]);
-}
 
 /// Along a straight line a cell of degree d is a polynomial of degree 3 d. Its Bernstein coefficients from its values
 /// at evenly spaced places: the inverse of the basis at these places, found once.
@@ -225,33 +324,42 @@ struct FromValues {
 const FromValues<4> from_4_values;
 const FromValues<10> from_10_values;
 
-/// The one root of f between t0, where it is above 0, and t1, where it is below: regula falsi after Illinois, halving
-/// where that stands still.
+/// The one root of f between t0, where it is not below 0, and t1, where it is below, by Chandrupatla's method (1997):
+/// the parabola through three values where that can be trusted, and halving where not. The answer is on t0's side of
+/// it.
 template <class F>
 double bracketed_root(const F& f, double t0, double f0, double t1, double f1) noexcept {
-  constexpr int most_rounds = 60;
-  const double close = 1e-14 * (t1 - t0);
-  double low = t0;
-  double high = t1;
-  double f_low = f0;
-  double f_high = f1;
-  for (int round = 0; round < most_rounds && high - low > close; ++round) {
-    double middle = low + (high - low) * (f_low / (f_low - f_high));
-    if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
-    if (!(middle > low && middle < high)) break;
-    const double there = f(middle);
-    if (there >= 0.0) {
-      low = middle;
-      f_low = there;
-      f_high *= round % 2 == 0 ? 1.0 : 0.5;
-    } else {
-      high = middle;
-      f_high = there;
-      f_low *= round % 2 == 0 ? 1.0 : 0.5;
+  constexpr int most_rounds = 100;
+  const double close =
+      std::max(1e-14 * (t1 - t0), 4.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t0), std::abs(t1)));
+  double at = t0;
+  double value = f0;
+  double other = t1;  // of the other sign
+  double other_value = f1;
+  double share = f0 / (f0 - f1);
+  for (int round = 0; round < most_rounds && std::abs(other - at) > close; ++round) {
+    const double least = 0.5 * close / std::abs(other - at);
+    const double next = at + std::clamp(share, least, 1.0 - least) * (other - at);
+    const double there = f(next);
+    const bool same = (there >= 0.0) == (value >= 0.0);
+    const double third = same ? at : other;
+    const double third_value = same ? value : other_value;
+    if (!same) {
+      other = at;
+      other_value = value;
     }
-    if (there == 0.0) break;
+    at = next;
+    value = there;
+    if (value == 0.0) return at;
+    const double xi = (at - other) / (third - other);
+    const double phi = (value - other_value) / (third_value - other_value);
+    share = 0.5;
+    if (phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi) {
+      share = value / (other_value - value) * third_value / (other_value - third_value) +
+              (third - at) / (other - at) * value / (third_value - value) * other_value / (third_value - other_value);
+    }
   }
-  return low;
+  return value >= 0.0 ? at : other;
 }
 
 /// A Bernstein polynomial at a place in [0, 1], by Horner's scheme.
@@ -332,46 +440,34 @@ bool first_zero(const double* coefficients, double& t) noexcept {
   return false;
 }
 
-/// The first zero between t0 and t1 of a polynomial with as many coefficients as `from` has rows, as a fraction.
-template <class F, int Count>
-bool first_zero_of(const F& f, const FromValues<Count>& from, double t0, double f0, double t1, double f1,
-                   double& found) noexcept {
-  constexpr auto size = static_cast<std::size_t>(Count);
-  double values[size];
-  double c[size];
-  values[0] = f0;
-  values[size - 1] = f1;
-  for (int i = 1; i + 1 < Count; ++i) values[i] = f(t0 + (t1 - t0) * i / (Count - 1));
+/// The first zero of a polynomial in [0, 1], by its values at evenly spaced places.
+template <int Count>
+bool first_zero_of(const FromValues<Count>& from, const double* values, double& found) noexcept {
+  double c[std::size_t{Count}];
   for (int row = 0; row < Count; ++row) {
     c[row] = 0.0;
     for (int i = 0; i < Count; ++i) c[row] += from.weight[row][i] * values[i];
   }
-  c[0] = f0;
-  c[size - 1] = f1;
+  c[0] = values[0];
+  c[Count - 1] = values[Count - 1];
   return first_zero<Count>(c, found);
 }
 
 }  // namespace
 
 void CellPolynomial::finish() noexcept {
-  const int n = degree + 1;
-  const int count = n * n * n;
-  double least = coefficient[0];
-  double greatest = coefficient[0];
-  double sum = 0.0;
-  for (int i = 0; i < count; ++i) {
-    least = coefficient[i] < least ? coefficient[i] : least;
-    greatest = coefficient[i] > greatest ? coefficient[i] : greatest;
-    sum += coefficient[i];
-  }
-  known = std::isfinite(sum);
-  low_ = least;
-  high_ = greatest;
+  CellRanges ranges;
   if (degree == 1) {
-    gradient_range<1>(*this, gradient_low_, gradient_high_);
+    linear_ranges(coefficient, ranges);
   } else {
-    gradient_range<3>(*this, gradient_low_, gradient_high_);
+    cubic.ranges(coefficient, ranges);
   }
+  known = std::isfinite(ranges.sum);
+  low_ = ranges.low;
+  high_ = ranges.high;
+  per_width = width.cwiseInverse();
+  gradient_low_ = degree * ranges.step_low.cwiseProduct(per_width);
+  gradient_high_ = degree * ranges.step_high.cwiseProduct(per_width);
 }
 
 void CellPolynomial::slope_range(const Vec3& d, double& least, double& greatest) const noexcept {
@@ -397,34 +493,65 @@ FieldJet CellPolynomial::jet(const Vec3& p) const noexcept {
   return degree == 1 ? evaluate<1, 2>(*this, p) : cubic.jet(*this, p);
 }
 
+void CellPolynomial::values(const Places& places, Lanes& out) const noexcept {
+  degree == 1 ? evaluate_four<1>(*this, places, out) : cubic.values(*this, places, out);
+}
+
 bool CellPolynomial::leaves_sign(const Vec3& a, const Vec3& b, double t0, double t1, double threshold, double sign,
                                  double& t) const noexcept {
   const double nearest = sign > 0.0 ? low_ - threshold : threshold - high_;
   if (nearest > 0.0) return false;
   const Vec3 motion = b - a;
+  const double length = t1 - t0;
   const auto f = [&](double at) { return sign * (value(a + at * motion) - threshold); };
-  double f0 = f(t0);
+  // Where it starts and ends is asked for alone: what is on the surface to rounding is on the same side for everyone.
+  double values[10];
+  const double f0 = values[0] = f(t0);
   if (f0 < 0.0) {
     t = t0;
     return true;
   }
-  const double f1 = f(t1);
-  const double length = t1 - t0;
+  const double f1 = values[9] = f(t1);
   double least = 0.0;
   double greatest = 0.0;
   slope_range(sign * motion, least, greatest);
-  if (f1 >= 0.0) {
-    // Above 0 at both ends: it can only dip below where its slope may fall and rise again.
-    if (least >= 0.0 || greatest <= 0.0) return false;
-    const double cut = (f1 - f0 - greatest * length) / (least - greatest);
-    if (f0 + least * cut > 0.0) return false;
-  } else if (greatest <= 0.0 || least >= 0.0) {
+  if (f1 < 0.0 && (greatest <= 0.0 || least >= 0.0)) {
     t = bracketed_root(f, t0, f0, t1, f1);
     return true;
   }
+  // Above 0 at both ends it can only dip below where its slope may fall and rise again.
+  if (f1 >= 0.0 && (least >= 0.0 || greatest <= 0.0)) return false;
+  const double ninth = length / 9.0;
+  const auto may_dip = [&](std::size_t from, std::size_t to) {
+    const double cut =
+        (values[to] - values[from] - greatest * ninth * static_cast<double>(to - from)) / (least - greatest);
+    return values[from] + least * cut <= 0.0;
+  };
+  if (f1 >= 0.0 && !may_dip(0, 9)) return false;
+  // By ninths of the way, four at a time; of a trilinear cell thirds are enough.
+  const auto ask = [&](const std::array<std::size_t, lanes>& ninths) {
+    Places places;
+    Lanes there;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const Vec3 place = a + (t0 + ninth * static_cast<double>(ninths[l])) * motion;
+      for (int axis = 0; axis < 3; ++axis) places[static_cast<std::size_t>(axis)][l] = place[axis];
+    }
+    this->values(places, there);
+    for (std::size_t l = 0; l < lanes; ++l) values[ninths[l]] = sign * (there[l] - threshold);
+  };
   double found = 0.0;
-  const bool reaches = degree == 1 ? first_zero_of(f, from_4_values, t0, f0, t1, f1, found)
-                                   : first_zero_of(f, from_10_values, t0, f0, t1, f1, found);
+  bool reaches = false;
+  if (degree == 1) {
+    ask({3, 6, 6, 6});
+    const double thirds[4] = {values[0], values[3], values[6], values[9]};
+    reaches = first_zero_of(from_4_values, thirds, found);
+  } else {
+    ask({2, 4, 5, 7});
+    if (f1 >= 0.0 && !may_dip(0, 2) && !may_dip(2, 4) && !may_dip(4, 5) && !may_dip(5, 7) && !may_dip(7, 9))
+      return false;
+    ask({1, 3, 6, 8});
+    reaches = first_zero_of(from_10_values, values, found);
+  }
   if (!reaches) return false;
   t = t0 + length * found;
   return true;

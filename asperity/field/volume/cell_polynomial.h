@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "asperity/core/lanes.h"
 #include "asperity/core/math.h"
 #include "asperity/core/names.h"
 
@@ -44,6 +45,7 @@ class CellPolynomial {
   bool known = false;  ///< false where a sample that the cell needs is not a number
   Vec3 lower = Vec3::Zero();
   Vec3 width = Vec3::Ones();
+  Vec3 per_width = Vec3::Ones();  ///< 1 / width
   /// Bernstein coefficients; place (i, j, k) at i + n (j + n k) with n = degree + 1.
   double coefficient[64];
 
@@ -57,6 +59,10 @@ class CellPolynomial {
   void slope_range(const Vec3& d, double& least, double& greatest) const noexcept;
 
   [[nodiscard]] double value(const Vec3& p) const noexcept;
+  /// The coordinates of four places.
+  using Places = std::array<Lanes, 3>;
+  /// At four places side by side, each to rounding what it is alone. [servo]
+  void values(const Places& places, Lanes& out) const noexcept;
   /// Value and gradient; the hessian is left at zero. [servo]
   [[nodiscard]] FieldJet gradient(const Vec3& p) const noexcept;
   /// Value, gradient and hessian. [servo]
