@@ -32,6 +32,16 @@ class Walk {
   Walk(Chart& chart, const Goal& goal, double side) noexcept : chart_(chart), asked_(goal), side_(side) {}
 
   DescentEnd run() noexcept {
+    while (true) {
+      const DescentEnd end = lead();
+      if (end != DescentEnd::rest || moves_ < long_way || !aims_anew()) return end;
+    }
+  }
+  /// Evaluations that it took. [servo]
+  [[nodiscard]] std::uint32_t moves() const noexcept { return static_cast<std::uint32_t>(moves_); }
+
+ private:
+  [[gnu::always_inline]] inline DescentEnd lead() noexcept {
     while (!out_of_moves()) {
       if (asked_.may_leave && leaves()) return DescentEnd::left;
       aim();
@@ -52,10 +62,23 @@ class Walk {
     }
     return DescentEnd::limited;
   }
-  /// Evaluations that it took. [servo]
-  [[nodiscard]] std::uint32_t moves() const noexcept { return static_cast<std::uint32_t>(moves_); }
 
- private:
+  /// Where the surface has turned so much on the way that friction does not hold the point where it came to rest, there
+  /// is more to go. A few times: each is aimed at from nearer.
+  [[nodiscard, gnu::noinline]] bool aims_anew() noexcept {
+    constexpr int most_rounds = 4;
+    constexpr double on_cone = 0.02;
+    if (asked_.friction <= 0.0 || aimed_anew_ == most_rounds) return false;
+    const Vec3 normal = side_ * chart_.spot().front;
+    if ((chart_.spot().point - asked_.point).dot(normal) <= 0.0 ||
+        within_cone(chart_.spot().point, normal, asked_.point, asked_.friction * (1.0 + on_cone)))
+      return false;
+    ++aimed_anew_;
+    aims_ = 0;
+    shortened_ = false;
+    return true;
+  }
+
   [[nodiscard]] bool out_of_moves() const noexcept {
     if (moves_ >= asked_.moves) return true;
     if constexpr (requires { chart_.work(); }) {
@@ -208,6 +231,8 @@ class Walk {
     chart.squared_distances(at, at, goal, squares);
   };
   static constexpr int most_aims = 2;
+  // Evaluations: on a shorter way the normal turns little.
+  static constexpr int long_way = 8;
   // A walk is at rest where so many moves bring it nearer by less than this share of the distance.
   static constexpr int look_after = 24;
   static constexpr double least_gain = 1e-6;
@@ -253,6 +278,7 @@ class Walk {
   Vec3 rejected_ = Vec3::Zero();  ///< of a place that was no nearer
   Vec3 rejected_point_ = Vec3::Zero();
   int aims_ = 0;
+  int aimed_anew_ = 0;
   int moves_ = 0;
 };
 

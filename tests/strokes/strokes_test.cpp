@@ -406,6 +406,15 @@ TEST(StrokesThatOnceFailed, friction_on_an_isosurface_holds_by_the_normal_where_
   EXPECT_GT(tally.asked, 50U);
 }
 
+// A long slip under friction kept to what its first two steps had aimed at, and came to rest outside of the cone where
+// the surface had turned: all but the push was cut off.
+TEST(StrokesThatOnceFailed, a_long_slip_comes_to_rest_on_the_cone) {
+  Tally tally;
+  std::map<std::string, int> kinds;
+  for (const std::string& wrong : strokes_over(1, 134, tally, kinds, folds)) ADD_FAILURE() << wrong;
+  EXPECT_GT(tally.touching, 3000U);
+}
+
 }  // namespace
 
 }  // namespace asperity::strokes
