@@ -365,54 +365,44 @@ TEST_P(Strokes, NorBetweenFolds) {
 }
 INSTANTIATE_TEST_SUITE_P(Parts, Strokes, testing::Range(std::uint64_t{0}, most_parts));
 
+/// Strokes that failed once: nothing is wrong with them now. What was touched and asked.
+Tally strokes_again(std::uint64_t seed, std::uint64_t scene, Maker first = nullptr) {
+  Tally tally;
+  std::map<std::string, int> kinds;
+  for (const std::string& wrong : strokes_over(seed, scene, tally, kinds, first)) ADD_FAILURE() << wrong;
+  return tally;
+}
+
 // Along the crease of an isosurface and a wall towards a relief: what stands 0.9 mm ahead was taken for what it
 // touches, and two ticks of work led nowhere.
 TEST(StrokesThatOnceFailed, along_a_crease_towards_a_third_surface) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(20782, 72, tally, kinds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.asked, 50U);
+  EXPECT_GT(strokes_again(20782, 72).asked, 50U);
 }
 
 // A slip under friction that would have ended farther from the probe was put back, in every tick anew.
 TEST(StrokesThatOnceFailed, a_slip_that_only_a_part_of_leads_nearer) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(102, 86, tally, kinds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.touching, 3000U);
+  EXPECT_GT(strokes_again(102, 86).touching, 3000U);
 }
 
 // Along a surface that bends away from its chord, what the chord met was nowhere near, and it did not go on.
 TEST(StrokesThatOnceFailed, a_way_that_bends_away_from_what_its_chord_meets) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(20783, 132, tally, kinds, folds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.asked, 50U);
+  EXPECT_GT(strokes_again(20783, 132, folds).asked, 50U);
 }
 
 // Two reliefs: a tenth of a skin before one of them it was put a skin off the other, and so behind the first.
 TEST(StrokesThatOnceFailed, lifted_off_one_surface_it_stays_before_the_next) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(20783, 137, tally, kinds, folds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.touching, 3000U);
+  EXPECT_GT(strokes_again(20783, 137, folds).touching, 3000U);
 }
 
 // A walk over an isosurface that was cut short told the normal of the place before, and friction held by that.
 TEST(StrokesThatOnceFailed, friction_on_an_isosurface_holds_by_the_normal_where_it_stands) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(0, 19, tally, kinds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.asked, 50U);
+  EXPECT_GT(strokes_again(0, 19).asked, 50U);
 }
 
 // A long slip under friction kept to what its first two steps had aimed at, and came to rest outside of the cone where
 // the surface had turned: all but the push was cut off.
 TEST(StrokesThatOnceFailed, a_long_slip_comes_to_rest_on_the_cone) {
-  Tally tally;
-  std::map<std::string, int> kinds;
-  for (const std::string& wrong : strokes_over(1, 134, tally, kinds, folds)) ADD_FAILURE() << wrong;
-  EXPECT_GT(tally.touching, 3000U);
+  EXPECT_GT(strokes_again(1, 134, folds).touching, 3000U);
 }
 
 }  // namespace

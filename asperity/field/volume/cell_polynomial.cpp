@@ -124,8 +124,7 @@ ASPERITY_INLINE FieldJet evaluate(const CellPolynomial& cell, const Vec3& p) noe
   return out;
 }
 
-/// At four places side by side, each by the same operations in the same order as alone: a start that is on the surface
-/// to rounding must be on the same side of it by both.
+/// At four places side by side: to rounding what each alone is, as sums may be fused in another order.
 template <int Degree>
 ASPERITY_INLINE void evaluate_four(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
   constexpr int n = Degree + 1;
