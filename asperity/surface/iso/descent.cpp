@@ -82,24 +82,30 @@ class Leader {
     }
   }
 
+  /// Of those that find_cells has found.
+  template <class Visit>
+  void for_each_cell(const Visit& visit) const noexcept {
+    for (std::uint32_t k = first_[2]; k <= last_[2]; ++k) {
+      for (std::uint32_t j = first_[1]; j <= last_[1]; ++j) {
+        for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) visit(CellIndex{{i, j, k}});
+      }
+    }
+  }
+
   /// The normal where x is.
   void look() noexcept {
     find_cells();
     Vec3 sum = Vec3::Zero();
-    for (std::uint32_t k = first_[2]; k <= last_[2]; ++k) {
-      for (std::uint32_t j = first_[1]; j <= last_[1]; ++j) {
-        for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) {
-          const CellPolynomial* cell = load({{i, j, k}});
-          if (cell == nullptr) continue;
-          ++moves_;
-          const Vec3 gradient = sign_ * cell->gradient(x_).gradient;
-          const double length = gradient.norm();
-          if (!(length > 0.0)) continue;
-          if (sum.isZero()) normal_ = gradient / length;
-          sum += gradient / length;
-        }
-      }
-    }
+    for_each_cell([&](const CellIndex& index) {
+      const CellPolynomial* cell = load(index);
+      if (cell == nullptr) return;
+      ++moves_;
+      const Vec3 gradient = sign_ * cell->gradient(x_).gradient;
+      const double length = gradient.norm();
+      if (!(length > 0.0)) return;
+      if (sum.isZero()) normal_ = gradient / length;
+      sum += gradient / length;
+    });
     away_ = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : normal_;
   }
 
@@ -187,24 +193,20 @@ class Leader {
     bool any = false;
     bool rests = false;
     Vec3 sum = Vec3::Zero();
-    for (std::uint32_t k = first_[2]; k <= last_[2]; ++k) {
-      for (std::uint32_t j = first_[1]; j <= last_[1]; ++j) {
-        for (std::uint32_t i = first_[0]; i <= last_[0]; ++i) {
-          const Pull pull = pull_in({{i, j, k}}, -1);
-          if (!pull.known) continue;
-          if (!any) normal_ = pull.normal;
-          any = true;
-          sum += pull.normal;
-          all_outside = all_outside && pull.outside;
-          if (pull.at_rest) {
-            if (!rests) normal_ = pull.normal;
-            rests = true;
-          } else if (leads_into(pull.cell, pull.step, -1)) {
-            leads.push_back(pull);
-          }
-        }
+    for_each_cell([&](const CellIndex& index) {
+      const Pull pull = pull_in(index, -1);
+      if (!pull.known) return;
+      if (!any) normal_ = pull.normal;
+      any = true;
+      sum += pull.normal;
+      all_outside = all_outside && pull.outside;
+      if (pull.at_rest) {
+        if (!rests) normal_ = pull.normal;
+        rests = true;
+      } else if (leads_into(pull.cell, pull.step, -1)) {
+        leads.push_back(pull);
       }
-    }
+    });
     if (!any) return Step::rim;
     away_ = sum.squaredNorm() > 1e-12 ? Vec3(sum.normalized()) : normal_;
     if (goal_.may_leave && all_outside) return Step::left;
