@@ -22,17 +22,18 @@ namespace {
 using Places = CellPolynomial::Places;
 using FourLanes = double __attribute__((vector_size(lanes * sizeof(double))));
 
-template <int Degree>
+/// At one place, or at four side by side.
+template <int Degree, class Number>
 struct Basis {
-  double value[std::size_t{Degree} + 1];
-  double slope[std::size_t{Degree} + 1];
-  double bend[std::size_t{Degree} + 1];
+  Number value[std::size_t{Degree} + 1];
+  Number slope[std::size_t{Degree} + 1];
+  Number bend[std::size_t{Degree} + 1];
 };
 
 /// Bernstein polynomials at u and their derivatives up to `Order`.
-template <int Degree, int Order>
-ASPERITY_INLINE void bernstein(double u, double scale, Basis<Degree>& b) noexcept {
-  const double w = 1.0 - u;
+template <int Degree, int Order, class Number>
+ASPERITY_INLINE void bernstein(const Number& u, double scale, Basis<Degree, Number>& b) noexcept {
+  const Number w = 1.0 - u;
   if constexpr (Degree == 1) {
     b.value[0] = w;
     b.value[1] = u;
@@ -65,8 +66,8 @@ ASPERITY_INLINE void bernstein(double u, double scale, Basis<Degree>& b) noexcep
 
 /// out[0 … Count) = sum over k of weights[k] * in[Count k …): the slowest index first, so that the sums run over
 /// neighbours in memory.
-template <int Degree, int Count>
-ASPERITY_INLINE void contract(const double* in, const double* weights, double* out) noexcept {
+template <int Degree, int Count, class In, class Number>
+ASPERITY_INLINE void contract(const In* in, const Number* weights, Number* out) noexcept {
   for (int i = 0; i < Count; ++i) out[i] = weights[0] * in[i];
   for (int k = 1; k <= Degree; ++k) {
     for (int i = 0; i < Count; ++i) out[i] += weights[k] * in[Count * k + i];
@@ -85,7 +86,7 @@ ASPERITY_INLINE FieldJet evaluate(const CellPolynomial& cell, const Vec3& p) noe
   constexpr int n = Degree + 1;
   constexpr auto row = static_cast<std::size_t>(n);
   constexpr std::size_t plane = row * row;
-  Basis<Degree> b[3];
+  Basis<Degree, double> b[3];
   for (int a = 0; a < 3; ++a) {
     const double scale = cell.per_width[a];
     bernstein<Degree, Order>((p[a] - cell.lower[a]) * scale, scale, b[a]);
@@ -130,33 +131,18 @@ ASPERITY_INLINE void evaluate_four(const CellPolynomial& cell, const Places& pla
   constexpr int n = Degree + 1;
   constexpr auto row = static_cast<std::size_t>(n);
   constexpr std::size_t plane = row * row;
-  FourLanes weight[3][row];
+  Basis<Degree, FourLanes> b[3];
   for (int a = 0; a < 3; ++a) {
     FourLanes u;
     std::memcpy(&u, &places[static_cast<std::size_t>(a)], sizeof(u));
-    u = (u - cell.lower[a]) * cell.per_width[a];
-    const FourLanes w = 1.0 - u;
-    if constexpr (Degree == 1) {
-      weight[a][0] = w;
-      weight[a][1] = u;
-    } else {
-      weight[a][0] = w * w * w;
-      weight[a][1] = 3.0 * u * w * w;
-      weight[a][2] = 3.0 * u * u * w;
-      weight[a][3] = u * u * u;
-    }
+    bernstein<Degree, 0>(FourLanes((u - cell.lower[a]) * cell.per_width[a]), 1.0, b[a]);
   }
-  FourLanes in_plane[plane];
-  for (std::size_t i = 0; i < plane; ++i) {
-    in_plane[i] = weight[2][0] * cell.coefficient[i];
-    for (std::size_t k = 1; k < row; ++k) in_plane[i] += weight[2][k] * cell.coefficient[plane * k + i];
-  }
+  FourLanes v[plane];
+  FourLanes v_[row];
+  contract<Degree, n * n>(cell.coefficient, b[2].value, v);
+  contract<Degree, n>(v, b[1].value, v_);
   FourLanes sum = {};
-  for (std::size_t i = 0; i < row; ++i) {
-    FourLanes in_row = weight[1][0] * in_plane[i];
-    for (std::size_t k = 1; k < row; ++k) in_row += weight[1][k] * in_plane[row * k + i];
-    sum += weight[0][i] * in_row;
-  }
+  for (std::size_t i = 0; i < row; ++i) sum += b[0].value[i] * v_[i];
   std::memcpy(&values, &sum, sizeof(sum));
 }
 
