@@ -115,10 +115,11 @@ TEST_P(EachReconstruction, BoundsHoldTheFieldAndItsSlopes) {
   const auto field = random_field(7, GetParam(), 11);
   std::mt19937_64 generator(3);
   CellPolynomial cell;
+  double most = 0.0;
   for (int n = 0; n < 3000; ++n) {
     const Vec3 p = random_point(generator, 0.05);
     ASSERT_TRUE(field->load(0, field->cell_of(0, p), cell));
-    const FieldJet jet = cell.gradient(p);
+    const FieldJet jet = cell.jet(p);
     EXPECT_LE(cell.low(), jet.value + 1e-12);
     EXPECT_GE(cell.high(), jet.value - 1e-12);
     const Vec3 d = random_point(generator, 1.0);
@@ -127,7 +128,12 @@ TEST_P(EachReconstruction, BoundsHoldTheFieldAndItsSlopes) {
     cell.slope_range(d, least, greatest);
     EXPECT_LE(least, jet.gradient.dot(d) + 1e-9);
     EXPECT_GE(greatest, jet.gradient.dot(d) - 1e-9);
+    const Vec3 unit = d.normalized();
+    EXPECT_LE((jet.hessian * unit).norm(), cell.most_bend() + 1e-9);
+    most = std::max(most, (jet.hessian * unit).norm() / cell.most_bend());
   }
+  // No looser than what Bernstein's form and the sum over directions make of it.
+  EXPECT_GE(most, 0.3);
 }
 
 TEST(SmoothField, GradientIsContinuousAcrossCellFacesOfStretchedGrids) {

@@ -212,6 +212,26 @@ TEST(IsoSurface, DescentThatIsCutShortTellsTheNormalWhereItStands) {
   EXPECT_GT(cut, 200);
 }
 
+TEST(IsoSurface, DescentComesToRestInFewEvaluationsWhereTheDistanceIsNearlyFlat) {
+  // Near its centre a sphere is all but as far away everywhere: what is left of a step's slope is a share of the depth.
+  const auto field = sphere_field(17, CellReconstruction::smooth);
+  const IsoSurface surface = IsoSurface::build(field, 0.03, Inside::low).value();
+  std::mt19937_64 generator(11);
+  for (int n = 0; n < 500; ++n) {
+    CellCache cells;
+    const Vec3 around = random_point(generator, 1.0).normalized() * 0.045;
+    const double off = 0.03 * std::pow(10.0, -1.0 - 1.5 * (n % 10) / 9.0);
+    const Vec3 goal = (around.normalized() + random_point(generator, 0.3)).normalized() * off;
+    const IsoCrossing start = surface.view(cells).first_crossing({around, Vec3::Zero()});
+    ASSERT_TRUE(start.found);
+    const IsoView view = surface.view(cells);
+    Place place{view.element_of(start.cell), false, start.point};
+    IsoSpot spot = view.at(place, start.outward);
+    const DescentEnd end = view.descend(place, spot, {.point = goal, .moves = 80});
+    EXPECT_EQ(end, DescentEnd::rest) << n << " off the centre by " << off;
+  }
+}
+
 TEST(IsoSurface, EndsAtTheVolumesBorder) {
   const IsoSurface surface =
       IsoSurface::build(std::make_shared<const ScalarField>(

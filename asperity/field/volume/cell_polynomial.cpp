@@ -453,6 +453,7 @@ void CellPolynomial::finish() noexcept {
   per_width = width.cwiseInverse();
   gradient_low_ = degree * ranges.step_low.cwiseProduct(per_width);
   gradient_high_ = degree * ranges.step_high.cwiseProduct(per_width);
+  most_bend_ = -1.0;
 }
 
 void CellPolynomial::slope_range(const Vec3& d, double& least, double& greatest) const noexcept {
@@ -464,6 +465,33 @@ void CellPolynomial::slope_range(const Vec3& d, double& least, double& greatest)
     least += std::min(low, high);
     greatest += std::max(low, high);
   }
+}
+
+double CellPolynomial::most_bend() const noexcept {
+  if (most_bend_ >= 0.0) return most_bend_;
+  const int n = degree + 1;
+  const int stride[3] = {1, n, n * n};
+  double squared = 0.0;  // of the matrix of the greatest second derivatives
+  for (int a = 0; a < 3; ++a) {
+    for (int b = a; b < 3; ++b) {
+      double greatest = 0.0;
+      int end[3] = {n, n, n};
+      --end[a];
+      --end[b];
+      for (int k = 0; k < end[2]; ++k) {
+        for (int j = 0; j < end[1]; ++j) {
+          for (int i = 0; i < end[0]; ++i) {
+            const double* c = coefficient + i + n * (j + n * k);
+            const double step = c[stride[a] + stride[b]] - c[stride[a]] - c[stride[b]] + c[0];
+            greatest = std::max(greatest, std::abs(step));
+          }
+        }
+      }
+      const double factor = degree * (a == b ? degree - 1.0 : degree) * per_width[a] * per_width[b];
+      squared += (a == b ? 1.0 : 2.0) * (factor * greatest) * (factor * greatest);
+    }
+  }
+  return most_bend_ = std::sqrt(squared);
 }
 
 double CellPolynomial::value(const Vec3& p) const noexcept {

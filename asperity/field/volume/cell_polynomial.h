@@ -57,6 +57,8 @@ class CellPolynomial {
   [[nodiscard]] Vec3 upper() const noexcept { return lower + width; }
   /// Least and greatest of the gradient's component along direction `d` anywhere in the cell: bounds. [servo]
   void slope_range(const Vec3& d, double& least, double& greatest) const noexcept;
+  /// How fast the gradient changes by length anywhere in the cell at most: a bound, found when first asked for. [servo]
+  [[nodiscard]] double most_bend() const noexcept;
 
   [[nodiscard]] double value(const Vec3& p) const noexcept;
   /// The coordinates of four places.
@@ -79,6 +81,7 @@ class CellPolynomial {
   double high_ = 0.0;
   Vec3 gradient_low_ = Vec3::Zero();
   Vec3 gradient_high_ = Vec3::Zero();
+  mutable double most_bend_ = -1.0;  ///< below 0: not known yet
 };
 
 }  // namespace asperity

@@ -30,6 +30,7 @@ struct Pull {
   Vec3 step = Vec3::Zero();    ///< along the tangent plane
   double drop = 0.0;           ///< how far the surface falls below the end of the step (m)
   double rate = 0.0;           ///< length of the pull
+  double slope = 0.0;          ///< of the field along the normal
 };
 
 class Leader {
@@ -122,6 +123,7 @@ class Leader {
     if (!(length > 0.0)) return false;
     pull.known = true;
     pull.normal = gradient / length;
+    pull.slope = length;
     pull.outside = (goal_.point - x_).dot(pull.normal) > 0.0;
     const Vec3 goal = goal_.friction > 0.0 ? friction_goal(x_, pull.normal, goal_.point, goal_.friction) : goal_.point;
     Vec3 v = goal - x_;
@@ -139,22 +141,28 @@ class Leader {
     pull.cell = index;
     const CellPolynomial* cell = load(index);
     if (cell == nullptr) return pull;
-    // The projection that led here knows the gradient; within a cell the second derivatives change so little that those
-    // of the last move serve once more.
+    // The projection that led here knows the gradient; within a cell the second derivatives mostly change so little
+    // that those of the last move serve once more.
     FieldJet jet;
-    if (face < 0 && arrived_ && arrived_cell_ == index) {
-      jet.gradient = arrived_gradient_;
-      jet.hessian = bend_;
-    } else {
+    const bool arrived = face < 0 && arrived_ && arrived_cell_ == index;
+    const auto look = [&] {
       ++moves_;
       jet = cell->jet(x_);
       bend_ = jet.hessian;
       bend_cell_ = index;
+    };
+    if (arrived) {
+      jet.gradient = arrived_gradient_;
+      jet.hessian = bend_;
+    } else {
+      look();
     }
     Vec3 s;
     double depth = 0.0;
     double length = 0.0;
     if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
+    constexpr double falls_fast = 0.25;
+    if (arrived && pull.rate > falls_fast * last_rate_) look();
     // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
     const Mat3 bend = (sign_ / length) * jet.hessian;
     if (face >= 0) {
@@ -271,6 +279,7 @@ class Leader {
         cell = load(pull.cell);
         continue;
       }
+      last_rate_ = pull.rate;
       x_ = y;
       return true;
     }
@@ -363,6 +372,8 @@ class Leader {
     double greatest = 0.0;
     cell.slope_range(sign_ * pull.normal, least, greatest);
     if (least > 0.0) return true;
+    // Or in the ball that they lie in.
+    if (pull.slope > cell.most_bend() * (y - x_).norm()) return true;
     const Vec3 gradient = sign_ * cell.gradient(y).gradient;
     const double length = gradient.norm();
     if (!(length > 0.0)) return false;
@@ -400,7 +411,8 @@ class Leader {
   bool on_face_[3] = {};
   Mat3 bend_ = Mat3::Zero();  ///< second derivatives of the last jet, in bend_cell_
   CellIndex bend_cell_;
-  bool arrived_ = false;  ///< x was found by `project`, in arrived_cell_ = bend_cell_
+  double last_rate_ = infinity;  ///< of the pull that was followed last
+  bool arrived_ = false;         ///< x was found by `project`, in arrived_cell_ = bend_cell_
   CellIndex arrived_cell_;
   Vec3 arrived_gradient_ = Vec3::Zero();
 };
