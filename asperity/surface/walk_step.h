@@ -44,22 +44,6 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
   return {};
 }
 
-/// Newton's step against a slope (g0, g1) in axes in which the metric is 1, each curvature counted as positive and at
-/// least as the given share of what a plane has. [servo]
-[[gnu::noinline]] inline Vec2 positive_step(double g0, double g1, double h00, double h01, double h11,
-                                            double least) noexcept {
-  const double mean = 0.5 * (h00 + h11);
-  const double apart = 0.5 * (h00 - h11);
-  const double half = std::sqrt(apart * apart + h01 * h01);
-  // The direction of the greater one: half the angle of (apart, h01).
-  const double cosine = half > 0.0 ? apart / half : 1.0;
-  const double along0 = std::sqrt(std::max(0.0, 0.5 * (1.0 + cosine)));
-  const double along1 = std::copysign(std::sqrt(std::max(0.0, 0.5 * (1.0 - cosine))), h01);
-  const double first = (along0 * g0 + along1 * g1) / std::max(least, std::abs(mean + half));
-  const double second = (along0 * g1 - along1 * g0) / std::max(least, std::abs(mean - half));
-  return {-(along0 * first - along1 * second), -(along1 * first + along0 * second)};
-}
-
 /// Newton's step with each curvature of the squared distance counted as positive: along a ravine, where it is not
 /// convex, and not to and fro across. [servo]
 [[gnu::noinline]] inline WalkStep ravine_step(const WalkForms& f) noexcept {
@@ -71,14 +55,30 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
   if (!(det > 0.0)) return {};
   const double c = 1.0 / std::sqrt(det);
   const double b = -f.uv / f.uu * c;
-  const Vec2 y = positive_step(a * f.g_u, b * f.g_u + c * f.g_v, a * a * f.h_uu, a * (b * f.h_uu + c * f.h_uv),
-                               b * b * f.h_uu + 2.0 * b * c * f.h_uv + c * c * f.h_vv, least_curvature);
-  return {a * y.x() + b * y.y(), c * y.y(), std::hypot(y.x(), y.y())};
+  const double g0 = a * f.g_u;
+  const double g1 = b * f.g_u + c * f.g_v;
+  const double h00 = a * a * f.h_uu;
+  const double h01 = a * (b * f.h_uu + c * f.h_uv);
+  const double h11 = b * b * f.h_uu + 2.0 * b * c * f.h_uv + c * c * f.h_vv;
+  const double mean = 0.5 * (h00 + h11);
+  const double half = std::hypot(0.5 * (h00 - h11), h01);
+  double along0 = 1.0;
+  double along1 = 0.0;
+  if (half > 0.0) {
+    const double angle = 0.5 * std::atan2(2.0 * h01, h00 - h11);
+    along0 = std::cos(angle);
+    along1 = std::sin(angle);
+  }
+  const double first = (along0 * g0 + along1 * g1) / std::max(least_curvature, std::abs(mean + half));
+  const double second = (along0 * g1 - along1 * g0) / std::max(least_curvature, std::abs(mean - half));
+  const double y0 = -(along0 * first - along1 * second);
+  const double y1 = -(along1 * first + along0 * second);
+  return {a * y0 + b * y1, c * y1, std::hypot(y0, y1)};
 }
 
 /// The same in the tangent plane of a surface that a field gives: from a place where the goal lies `pull` (m) along it
-/// and `depth` (m) above it, `bend` the field's second derivatives over its slope. Where the distance is not
-/// convex, or nearly flat, each of its curvatures counts as positive. [servo]
+/// and `depth` (m) above it, `bend` the field's second derivatives over its slope. The pull itself where the distance
+/// is not convex. [servo]
 inline Vec3 tangent_step(const Vec3& normal, const Vec3& pull, double depth, const Mat3& bend) noexcept {
   const double rate = pull.norm();
   const Vec3 along = pull / rate;
@@ -88,9 +88,7 @@ inline Vec3 tangent_step(const Vec3& normal, const Vec3& pull, double depth, con
   const double c = 1.0 + depth * across.dot(bend * across);
   const double determinant = a * c - b * b;
   if (a > 0.05 && determinant > 0.05 * c && c > 0.0) return (rate / determinant) * (c * along - b * across);
-  constexpr double least_curvature = 0.02;
-  const Vec2 y = positive_step(-rate, 0.0, a, b, c, least_curvature);
-  return y.x() * along + y.y() * across;
+  return pull;
 }
 
 }  // namespace asperity

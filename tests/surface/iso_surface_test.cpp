@@ -227,7 +227,7 @@ TEST(IsoSurface, DescentComesToRestInFewEvaluationsWhereTheDistanceIsNearlyFlat)
     const IsoView view = surface.view(cells);
     Place place{view.element_of(start.cell), false, start.point};
     IsoSpot spot = view.at(place, start.outward);
-    const DescentEnd end = view.descend(place, spot, {.point = goal, .moves = 80});
+    const DescentEnd end = view.descend(place, spot, {.point = goal, .moves = 120});
     EXPECT_EQ(end, DescentEnd::rest) << n << " off the centre by " << off;
   }
 }

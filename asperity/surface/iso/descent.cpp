@@ -61,6 +61,10 @@ class Leader {
  private:
   enum class Step { moved, rest, left, rim };
   static constexpr int budget = 400;  // evaluations
+  // So many times as far as the last step may the next one go, where that was cut short.
+  static constexpr double wider = 3.0;
+  // Cosine of what turns so little that it goes the same way.
+  static constexpr double same_way = 0.99;
 
   const CellPolynomial* load(const CellIndex& cell) noexcept {
     CellPolynomial& slot = surface_.cells->slot(surface_.field->identity(), surface_.level, cell);
@@ -270,21 +274,46 @@ class Leader {
     constexpr int most_halvings = 12;
     const CellPolynomial* cell = load(pull.cell);
     const double before = (goal_.point - x_).squaredNorm();
-    double share = 1.0;
-    for (int attempt = 0; attempt < most_halvings; ++attempt, share *= 0.5) {
+    const double least_way = 0.5 * on_face * cell->width.minCoeff();
+    double share = further(pull);
+    // Where the last step had to be cut short, this one will have to be too.
+    if (room_ < infinity) share = std::min(share, room_ / pull.step.norm());
+    for (int attempt = 0; attempt < most_halvings; ++attempt, share = std::min(1.0, 0.5 * share)) {
       Vec3 y = x_ + share * pull.step - (share * share * pull.drop) * pull.normal;
       if (!arrive(*cell, face, y)) continue;
-      if (!((goal_.point - y).squaredNorm() < before)) continue;
+      // Across a border that it is on there is no way: what it comes nearer by then is rounding.
+      if (!((goal_.point - y).squaredNorm() < before) || (y - x_).squaredNorm() <= least_way * least_way) continue;
       if (!same_sheet(*cell, pull, y)) {
         cell = load(pull.cell);
         continue;
       }
       last_rate_ = pull.rate;
+      last_step_ = pull.step;
+      last_share_ = share;
+      last_x_ = x_;
+      room_ = share < 1.0 ? wider * share * pull.step.norm() : infinity;
       x_ = y;
       return true;
     }
     arrived_ = false;
+    room_ = last_rate_ = infinity;
     return false;
+  }
+
+  /// How many steps of a pull to go at once: where each leaves a like share of the pull, as many as all of them are;
+  /// where each leaves more, more and more.
+  [[nodiscard]] double further(const Pull& pull) const noexcept {
+    constexpr double slow = 0.5;
+    constexpr double most = 50.0;
+    constexpr double faster = 4.0;
+    if (!(pull.rate > slow * last_rate_)) return 1.0;
+    // Only where that was a whole step, not cut short nor ended by a border.
+    const Vec3 way = x_ - last_x_;
+    const double last = last_step_.squaredNorm();
+    if (last_share_ < 1.0 || way.dot(last_step_) < same_way * last_share_ * last) return 1.0;
+    if (pull.step.dot(last_step_) < same_way * std::sqrt(pull.step.squaredNorm() * last)) return 1.0;
+    const double left = pull.rate / last_rate_;
+    return std::min(most, left < 1.0 ? 1.0 / (1.0 - left) : faster * last_share_);
   }
 
   /// Cuts the way from x to y at the cell's border and brings its end onto the surface there.
@@ -411,8 +440,12 @@ class Leader {
   bool on_face_[3] = {};
   Mat3 bend_ = Mat3::Zero();  ///< second derivatives of the last jet, in bend_cell_
   CellIndex bend_cell_;
-  double last_rate_ = infinity;  ///< of the pull that was followed last
-  bool arrived_ = false;         ///< x was found by `project`, in arrived_cell_ = bend_cell_
+  double last_rate_ = infinity;    ///< of the pull that was followed last
+  Vec3 last_step_ = Vec3::Zero();  ///< of that pull
+  double last_share_ = 1.0;        ///< of it, that was gone
+  Vec3 last_x_ = Vec3::Zero();     ///< from where
+  double room_ = infinity;         ///< how far the next step may go (m)
+  bool arrived_ = false;           ///< x was found by `project`, in arrived_cell_ = bend_cell_
   CellIndex arrived_cell_;
   Vec3 arrived_gradient_ = Vec3::Zero();
 };
