@@ -41,7 +41,10 @@ class Leader {
         goal_(goal),
         sign_(side * surface.sigma),
         x_(spot.point),
-        away_(spot.away) {}
+        away_(spot.away) {
+    const double least = 0.5 * on_face * surface.field->narrowest_cell();
+    least_way_ = least * least;
+  }
 
   DescentEnd run() noexcept {
     const std::uint32_t most = std::min(static_cast<std::uint32_t>(std::min(budget, goal_.moves)), goal_.work);
@@ -63,6 +66,8 @@ class Leader {
   static constexpr int budget = 400;  // evaluations
   // So many times as far as the last step may the next one go, where that was cut short.
   static constexpr double wider = 3.0;
+  // A pull that falls by less in a step is slow to.
+  static constexpr double slow = 0.5;
   // Cosine of what turns so little that it goes the same way.
   static constexpr double same_way = 0.99;
 
@@ -165,8 +170,8 @@ class Leader {
     double depth = 0.0;
     double length = 0.0;
     if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
-    constexpr double falls_fast = 0.25;
-    if (arrived && pull.rate > falls_fast * last_rate_) look();
+    const bool within = !on_face_[0] && !on_face_[1] && !on_face_[2];
+    if (arrived && within && pull.rate > slow * last_rate_) look();
     // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
     const Mat3 bend = (sign_ / length) * jet.hessian;
     if (face >= 0) {
@@ -274,15 +279,14 @@ class Leader {
     constexpr int most_halvings = 12;
     const CellPolynomial* cell = load(pull.cell);
     const double before = (goal_.point - x_).squaredNorm();
-    const double least_way = 0.5 * on_face * cell->width.minCoeff();
-    double share = further(pull);
+    double share = pull.rate > slow * last_rate_ ? further(pull) : 1.0;
     // Where the last step had to be cut short, this one will have to be too.
     if (room_ < infinity) share = std::min(share, room_ / pull.step.norm());
     for (int attempt = 0; attempt < most_halvings; ++attempt, share = std::min(1.0, 0.5 * share)) {
       Vec3 y = x_ + share * pull.step - (share * share * pull.drop) * pull.normal;
       if (!arrive(*cell, face, y)) continue;
       // Across a border that it is on there is no way: what it comes nearer by then is rounding.
-      if (!((goal_.point - y).squaredNorm() < before) || (y - x_).squaredNorm() <= least_way * least_way) continue;
+      if (!((goal_.point - y).squaredNorm() < before) || (y - x_).squaredNorm() <= least_way_) continue;
       if (!same_sheet(*cell, pull, y)) {
         cell = load(pull.cell);
         continue;
@@ -302,11 +306,9 @@ class Leader {
 
   /// How many steps of a pull to go at once: where each leaves a like share of the pull, as many as all of them are;
   /// where each leaves more, more and more.
-  [[nodiscard]] double further(const Pull& pull) const noexcept {
-    constexpr double slow = 0.5;
+  [[nodiscard, gnu::noinline]] double further(const Pull& pull) const noexcept {
     constexpr double most = 50.0;
     constexpr double faster = 4.0;
-    if (!(pull.rate > slow * last_rate_)) return 1.0;
     // Only where that was a whole step, not cut short nor ended by a border.
     const Vec3 way = x_ - last_x_;
     const double last = last_step_.squaredNorm();
@@ -444,6 +446,7 @@ class Leader {
   Vec3 last_step_ = Vec3::Zero();  ///< of that pull
   double last_share_ = 1.0;        ///< of it, that was gone
   Vec3 last_x_ = Vec3::Zero();     ///< from where
+  double least_way_ = 0.0;         ///< squared: a move that is none
   double room_ = infinity;         ///< how far the next step may go (m)
   bool arrived_ = false;           ///< x was found by `project`, in arrived_cell_ = bend_cell_
   CellIndex arrived_cell_;
