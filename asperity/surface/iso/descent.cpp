@@ -277,6 +277,7 @@ class Leader {
   /// Follows the pull to its end, or to the border of its cell. False when no part of it comes nearer.
   bool follow(const Pull& pull, int face) noexcept {
     constexpr int most_halvings = 12;
+    constexpr int most_hardly = 3;
     const CellPolynomial* cell = load(pull.cell);
     const double before = (goal_.point - x_).squaredNorm();
     double share = pull.rate > slow * last_rate_ ? further(pull) : 1.0;
@@ -285,12 +286,15 @@ class Leader {
     for (int attempt = 0; attempt < most_halvings; ++attempt, share = std::min(1.0, 0.5 * share)) {
       Vec3 y = x_ + share * pull.step - (share * share * pull.drop) * pull.normal;
       if (!arrive(*cell, face, y)) continue;
-      // Across a border that it is on there is no way: what it comes nearer by then is rounding.
-      if (!((goal_.point - y).squaredNorm() < before) || (y - x_).squaredNorm() <= least_way_) continue;
+      if (!((goal_.point - y).squaredNorm() < before)) continue;
+      // Onto a border that it is all but on, it may; to and fro between borders, it comes nearer by rounding alone.
+      const bool hardly = (y - x_).squaredNorm() <= least_way_;
+      if (hardly && hardly_ == most_hardly) continue;
       if (!same_sheet(*cell, pull, y)) {
         cell = load(pull.cell);
         continue;
       }
+      hardly_ = hardly ? hardly_ + 1 : 0;
       last_rate_ = pull.rate;
       last_step_ = pull.step;
       last_share_ = share;
@@ -446,7 +450,8 @@ class Leader {
   Vec3 last_step_ = Vec3::Zero();  ///< of that pull
   double last_share_ = 1.0;        ///< of it, that was gone
   Vec3 last_x_ = Vec3::Zero();     ///< from where
-  double least_way_ = 0.0;         ///< squared: a move that is none
+  double least_way_ = 0.0;         ///< squared: a move that is hardly one
+  int hardly_ = 0;                 ///< of those, one after the other
   double room_ = infinity;         ///< how far the next step may go (m)
   bool arrived_ = false;           ///< x was found by `project`, in arrived_cell_ = bend_cell_
   CellIndex arrived_cell_;
