@@ -154,7 +154,7 @@ class Leader {
     // that those of the last move serve once more.
     FieldJet jet;
     const bool arrived = face < 0 && arrived_ && arrived_cell_ == index;
-    const auto look = [&] {
+    const auto ask = [&] {
       ++moves_;
       jet = cell->jet(x_);
       bend_ = jet.hessian;
@@ -164,14 +164,15 @@ class Leader {
       jet.gradient = arrived_gradient_;
       jet.hessian = bend_;
     } else {
-      look();
+      ask();
     }
     Vec3 s;
     double depth = 0.0;
     double length = 0.0;
     if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
+    // On a face the last step may only have ended too soon.
     const bool within = !on_face_[0] && !on_face_[1] && !on_face_[2];
-    if (arrived && within && pull.rate > slow * last_rate_) look();
+    if (arrived && within && pull.rate > slow * last_rate_) ask();
     // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
     const Mat3 bend = (sign_ / length) * jet.hessian;
     if (face >= 0) {
