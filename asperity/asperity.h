@@ -154,9 +154,10 @@
 #include "asperity/device/stroke.h"
 #include "asperity/device/velocity_estimator.h"
 
-// servo: safety stage, session
+// servo: safety stage, session, memory warmed before it
 #include "asperity/servo/safety_stage.h"
 #include "asperity/servo/session.h"
+#include "asperity/servo/warm_memory.h"
 
 // io: files of meshes, images, volumes, scenes and traces
 #include "asperity/io/atomic_file.h"

@@ -12,6 +12,7 @@
 #include "asperity/io/trace_file.h"
 #include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"
+#include "asperity/servo/warm_memory.h"
 
 namespace asperity::program {
 namespace {
@@ -42,6 +43,7 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
     if (fetched.ok()) fetched = fetch_volumes(experiment.scene, state, sample);
     return step(experiment.scene, state, cache, sample, dt);
   };
+  warm_memory(progress);
   result.summary = run_session(render, probe, safety, settings, keep, progress);
   ASPERITY_CHECK(std::move(written));
   ASPERITY_CHECK(std::move(fetched));
