@@ -6,7 +6,8 @@
 
 #include <algorithm>
 #include <memory>
-#include <string>
+#include <new>
+#include <string_view>
 #include <vector>
 
 namespace asperity::warm_memory_test {
@@ -17,9 +18,9 @@ const std::size_t page_size = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 /// Private memory of its own, as a large vector has it; nothing of it is written yet.
 class Block {
  public:
-  explicit Block(std::size_t pages, int rights = PROT_READ | PROT_WRITE)
+  explicit Block(std::size_t pages)
       : bytes_(pages * page_size),
-        data_(static_cast<char*>(::mmap(nullptr, bytes_, rights, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))) {
+        data_(static_cast<char*>(::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))) {
     if (data_ == MAP_FAILED) throw std::bad_alloc();
     ::madvise(data_, bytes_, MADV_NOHUGEPAGE);
   }
