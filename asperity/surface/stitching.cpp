@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asperity/core/fixed_vector.h"
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/unset_vector.h"
 
@@ -65,24 +66,124 @@ UnsetVector<double> reaches(const TriangleMesh& mesh, const Widths& widths, cons
   return reach;
 }
 
-/// How far into `face`, against how far into `other`, a place of `face` lies beyond their common edge when both are
-/// seen along the directions of the edge's ends: 1 where those are symmetric, the lesser of both ends.
-double mirror_ratio(const TriangleMesh& mesh, const Shell& shell, std::uint32_t face, int corner, std::uint32_t other) {
+/// How far into `face`, against how far into `other`, a place of `face` lies beyond their common edge when it is seen
+/// along the directions there: 1 where those are symmetric, the least within `most` (coordinate of the corner opposite
+/// the edge) of it.
+double mirror_ratio(const TriangleMesh& mesh, const Shell& shell, std::uint32_t face, int corner, std::uint32_t other,
+                    double most) {
   const TriangleMesh::Triangle& t = mesh.triangles()[face];
   const std::uint32_t ends[2] = {t[static_cast<std::size_t>((corner + 1) % 3)],
                                  t[static_cast<std::size_t>((corner + 2) % 3)]};
+  const Vec3 opposite = shell.directions[t[static_cast<std::size_t>(corner)]].cast<double>();
   const Vec3 along = (mesh.positions()[ends[1]] - mesh.positions()[ends[0]]).normalized();
   const Vec3 normal = mesh.face_normal(other);
   const Vec3 into = mesh.face_normal(face).cross(along);
   const Vec3 into_other = -normal.cross(along);
   double least = 1.0;
+  // A quotient of what is linear in the place: least at a corner of the strip.
   for (const std::uint32_t end : ends) {
-    const Vec3 direction = shell.directions[end].cast<double>();
-    const double seen = normal.dot(direction);
-    if (seen <= 0.0) return 0.0;
-    least = std::min(least, -into_other.dot(into) + normal.dot(into) * into_other.dot(direction) / seen);
+    const Vec3 at_edge = shell.directions[end].cast<double>();
+    for (const double off : {0.0, most}) {
+      const Vec3 direction = at_edge + off * (opposite - at_edge);
+      const double seen = normal.dot(direction);
+      if (seen <= 0.0) return 0.0;
+      least = std::min(least, -into_other.dot(into) + normal.dot(into) * into_other.dot(direction) / seen);
+    }
   }
   return least;
+}
+
+/// Where the coordinate of a corner is below this the face across the opposite edge may have a say.
+float look_across(const TriangleMesh& mesh, const Shell& shell, std::uint32_t face, int corner, double rho) {
+  constexpr double least_ratio = 0.25;
+  constexpr double room = 1.01;
+  const std::uint32_t other = mesh.neighbour(face, edge_opposite(corner));
+  double look = room * rho;
+  // The farther one looks the more the directions have turned.
+  for (int round = 0; other != no_index && round < 2; ++round)
+    look = room * rho / std::max(least_ratio, mirror_ratio(mesh, shell, face, corner, other, look));
+  return static_cast<float>(look);
+}
+
+/// The faces around a vertex, seen along its direction.
+struct Fan {
+  struct Wedge {
+    std::uint32_t face;
+    std::size_t corner;  ///< of the vertex
+    Vec2 first;          ///< where the edge from it to the next corner leads (m)
+    Vec2 second;
+    double area;  ///< twice (m^2): below 0 seen from behind
+  };
+  FixedVector<Wedge, 24> wedges;
+};
+
+double cross_of(const Vec2& a, const Vec2& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// False where there are more faces than a fan holds.
+bool look_at_fan(const TriangleMesh& mesh, std::uint32_t vertex, const Vec3& direction, Fan& fan) {
+  fan.wedges.clear();
+  const Vec3 right = direction.unitOrthogonal();
+  const Vec3 up = direction.normalized().cross(right);
+  const auto faces = mesh.faces_of_vertex(vertex);
+  if (faces.size() > fan.wedges.capacity()) return false;
+  for (const std::uint32_t face : faces) {
+    const std::size_t k = mesh.corner_of(face, vertex);
+    const auto corners = mesh.corners(face);
+    const auto seen = [&](const Vec3& edge) { return Vec2(edge.dot(right), edge.dot(up)); };
+    const Vec2 first = seen(corners[(k + 1) % 3] - corners[k]);
+    const Vec2 second = seen(corners[(k + 2) % 3] - corners[k]);
+    fan.wedges.push_back({face, k, first, second, cross_of(first, second)});
+  }
+  return true;
+}
+
+/// Up to which 1 - coordinate of the vertex another face of the fan may have a say in one of them; infinite where no
+/// end is seen.
+double say_of(const Fan::Wedge& other, const Fan::Wedge& own, const float* rho) {
+  if (!(other.area > 0.0) || !(own.area > 0.0)) return std::numeric_limits<double>::infinity();
+  // How fast the two coordinates of the other face that are 0 at the vertex fall, against what its bands let them,
+  // along both edges of the own one: it has a say up to where the faster one is there.
+  const auto fall = [&](const Vec2& way) {
+    return Vec2(-cross_of(way, other.second) / (other.area * static_cast<double>(rho[(other.corner + 1) % 3])),
+                -cross_of(other.first, way) / (other.area * static_cast<double>(rho[(other.corner + 2) % 3])));
+  };
+  const Vec2 along_first = fall(own.first);
+  const Vec2 along_second = fall(own.second);
+  double slowest = std::min(along_first.maxCoeff(), along_second.maxCoeff());
+  // Between the edges where both are as fast.
+  const Vec2 change = along_second - along_first;
+  const double apart = change.x() - change.y();
+  const double share = (along_first.y() - along_first.x()) / apart;
+  if (apart != 0.0 && share > 0.0 && share < 1.0) slowest = std::min(slowest, along_first.x() + share * change.x());
+  return slowest > 0.0 ? 1.0 / slowest : std::numeric_limits<double>::infinity();
+}
+
+void narrow_reaches_around(std::uint32_t vertex, const TriangleMesh& mesh, const Shell& shell,
+                           std::vector<StitchBand>& bands) {
+  // A corner that is no larger is a hundredth of its face.
+  constexpr float worth_it = 0.1F;
+  // For directions that turn within the corner.
+  constexpr double room = 1.25;
+  const auto faces = mesh.faces_of_vertex(vertex);
+  const bool wide = std::any_of(faces.begin(), faces.end(), [&](std::uint32_t face) {
+    return bands[face].reach[mesh.corner_of(face, vertex)] > worth_it;
+  });
+  Fan fan;
+  if (!wide || !look_at_fan(mesh, vertex, shell.directions[vertex].cast<double>(), fan)) return;
+  for (const Fan::Wedge& own : fan.wedges) {
+    float& reach = bands[own.face].reach[own.corner];
+    if (reach <= worth_it) continue;
+    double farthest = 0.0;
+    for (const Fan::Wedge& other : fan.wedges) {
+      if (other.face == own.face || mesh.neighbour(own.face, static_cast<int>(own.corner)) == other.face ||
+          mesh.neighbour(own.face, static_cast<int>((own.corner + 2) % 3)) == other.face)
+        continue;
+      farthest = std::max(farthest, say_of(other, own, bands[other.face].rho));
+    }
+    reach = static_cast<float>(std::min(static_cast<double>(reach), room * farthest));
+  }
 }
 
 }  // namespace
@@ -172,17 +273,17 @@ std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shel
   for_all(faces, [&](std::uint32_t face) {
     for (std::size_t k = 0; k < 3; ++k) {
       bands[face].rho[k] = static_cast<float>(widths[face][k] / shapes[face].height[k]);
-      const int corner = static_cast<int>(k);
-      const std::uint32_t other = mesh.neighbour(face, edge_opposite(corner));
-      constexpr double least_ratio = 0.25;
-      const double ratio =
-          other == no_index ? 1.0 : std::max(least_ratio, mirror_ratio(mesh, shell, face, corner, other));
-      bands[face].look[k] = 1.01F * bands[face].rho[k] / static_cast<float>(ratio);
+      bands[face].look[k] =
+          look_across(mesh, shell, face, static_cast<int>(k), static_cast<double>(bands[face].rho[k]));
       bands[face].reach[k] =
           static_cast<float>(std::min(1.0, reach[mesh.triangles()[face][k]] / shapes[face].height[k]));
     }
   });
   return bands;
+}
+
+void narrow_reaches(const TriangleMesh& mesh, const Shell& shell, std::vector<StitchBand>& bands) {
+  for_all(mesh.positions().size(), [&](std::uint32_t vertex) { narrow_reaches_around(vertex, mesh, shell, bands); });
 }
 
 }  // namespace asperity

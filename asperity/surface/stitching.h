@@ -75,12 +75,16 @@ struct StitchBand {
   /// Per edge: where the coordinate of corner k is below this, the face across may have a say: rho, and more where the
   /// fold and the directions over it are lopsided.
   float look[3] = {0.0F, 0.0F, 0.0F};
-  /// Per corner: where its barycentric coordinate is above 1 - reach, every face around the corner may have a say.
+  /// Per corner: where its barycentric coordinate is above 1 - reach, every face around the corner may have a say;
+  /// elsewhere those across its edges alone, which `look` tells.
   float reach[3] = {0.0F, 0.0F, 0.0F};
 };
 
 /// Bands in metres an edge, the same from both its faces, narrowed until what a face has a say in lies within the faces
 /// around its vertices (amendment 3: "1/3 is safe" fails where a neighbour is less high). One band a face. [build]
 std::vector<StitchBand> stitch_bands(const TriangleMesh& mesh, const Shell& shell, double rho);
+/// Narrows `reach`, which stitch_bands finds by the sharpest corner around a vertex, to how far faces beyond the
+/// neighbours of each do have a say, seen along the vertex's direction. [build]
+void narrow_reaches(const TriangleMesh& mesh, const Shell& shell, std::vector<StitchBand>& bands);
 
 }  // namespace asperity

@@ -57,7 +57,7 @@ class Walk {
         if (turn == Turn::rest) return DescentEnd::rest;
         if (asked_.may_leave && leaves()) return DescentEnd::left;
       }
-      if (!advance(step) && !along_fold()) return DescentEnd::rest;
+      if (!advance(step) && !along_fold()) return out_of_moves() ? DescentEnd::limited : DescentEnd::rest;
       if (moves_ >= next_look_ && creeps()) return DescentEnd::rest;
     }
     return DescentEnd::limited;
@@ -176,7 +176,7 @@ class Walk {
       if (chart_.stopped()) return false;
     }
     // The first sample is no nearer: shorter steps.
-    for (int i = 0; i < 16; ++i) {
+    for (int i = 0; i < 16 && !out_of_moves(); ++i) {
       share *= 0.4;
       if (share * step.length <= chart_.rest_length(false)) break;
       if (attempt(share, -1)) return true;

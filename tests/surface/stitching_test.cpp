@@ -599,6 +599,82 @@ TEST(StitchBands, are_the_same_width_from_both_faces_and_end_within_the_faces_ar
   }
 }
 
+/// How much of a say (the least of what its three coordinates are above -rho, as shares of rho; below 0: none) a face
+/// has at a place of another one, seen along the place's own direction.
+double say_at(const ShellPrism& prism, double u, double v, const TriangleMesh& mesh, std::uint32_t other,
+              const StitchBand& band) {
+  const auto corners = mesh.corners(other);
+  const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  const Vec3 direction = prism.direction_at(u, v);
+  // Faces that are seen more aslant than by 0.02 have none.
+  if (normal.dot(direction) <= 0.02 * direction.norm()) return -1.0;
+  const Vec3 base = prism.base_at(u, v);
+  const Vec3 there = base + normal.dot(corners[0] - base) / normal.dot(direction) * direction;
+  const Vec3 at = barycentric_frame(mesh, other).coordinates(there);
+  double least = infinity;
+  for (int k = 0; k < 3; ++k) least = std::min(least, at[k] / static_cast<double>(band.rho[k]) + 1.0);
+  return least;
+}
+
+TEST(StitchBands, tell_all_faces_around_that_have_a_say) {
+  int say = 0;
+  for (int kind = 0; kind < kinds_of_base; ++kind) {
+    for (const double rho : {0.05, 0.2, 1.0 / 3.0}) {
+      const TriangleMesh mesh = mesh_of(base_of_kind(kind, 5));
+      const Shell shell = Shell::build(mesh);
+      std::vector<StitchBand> bands = stitch_bands(mesh, shell, rho);
+      narrow_reaches(mesh, shell, bands);
+      Rng rng(7);
+      for (int i = 0; i < 20000; ++i) {
+        const std::uint32_t face = random_face(rng, mesh);
+        // At all distances from a corner.
+        const auto corner = static_cast<int>(rng.below(3));
+        const double off = std::pow(10.0, rng.uniform(-3.0, 0.0));
+        const double share = rng.uniform();
+        Vec3 at = Vec3::Zero();
+        at[corner] = 1.0 - off;
+        at[(corner + 1) % 3] = off * share;
+        at[(corner + 2) % 3] = off * (1.0 - share);
+        const ShellPrism prism = shell.prism(mesh, face);
+        const TriangleMesh::Triangle& t = mesh.triangles()[face];
+        for (std::size_t k = 0; k < 3; ++k) {
+          for (const std::uint32_t other : mesh.faces_of_vertex(t[k])) {
+            if (other == face) continue;
+            const double here = say_at(prism, at[1], at[2], mesh, other, bands[other]);
+            if (here <= 1e-6) continue;
+            ++say;
+            bool asked = at[static_cast<int>(k)] > 1.0 - static_cast<double>(bands[face].reach[k]);
+            for (int edge = 0; edge < 3; ++edge)
+              asked = asked || (mesh.neighbour(face, (edge + 1) % 3) == other &&
+                                at[edge] < static_cast<double>(bands[face].look[edge]));
+            ASSERT_TRUE(asked) << "kind " << kind << ", rho " << rho << ": face " << other << " at " << at.transpose()
+                               << " of " << face << ": " << here;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(say, 100000);
+}
+
+TEST(StitchBands, leave_most_of_a_face_to_itself_beside_a_sliver) {
+  // One sliver widens the reach of every face around its vertex.
+  MeshSource fan;
+  fan.positions = {{0.0, 0.0, 0.0},  {1.0, 0.0, 0.0},    {0.5, 0.9, 0.0},   {-0.5, 0.9, 0.0},
+                   {-1.0, 0.0, 0.0}, {-1.0, -0.12, 0.0}, {-0.5, -0.9, 0.0}, {0.5, -0.9, 0.0}};
+  fan.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}, {0, 5, 6}, {0, 6, 7}, {0, 7, 1}};
+  const TriangleMesh mesh = mesh_of(fan);
+  const Shell shell = Shell::build(mesh);
+  std::vector<StitchBand> bands = stitch_bands(mesh, shell, 0.2);
+  const std::vector<StitchBand> wide = bands;
+  narrow_reaches(mesh, shell, bands);
+  for (const std::uint32_t far : {0U, 1U}) {
+    EXPECT_GT(wide[far].reach[0], 0.4F);
+    EXPECT_LT(bands[far].reach[0], 0.15F);
+  }
+  for (std::size_t face = 0; face < bands.size(); ++face) EXPECT_LE(bands[face].reach[0], wide[face].reach[0]);
+}
+
 TEST(StitchingSettings, each_bad_value_is_named) {
   const auto expect_refused = [](const Stitching& stitching, const std::string& place) {
     const Status status = validate(stitching);

@@ -93,6 +93,8 @@ void ReliefSurface::lay_bands() {
   const bool joined = coat_.has_seams() || stitching.folds != FoldMode::keep;
   const bool blended = stitching.blend != Blend::none || stitching.folds == FoldMode::fillet;
   if (joined && blended) bands_ = stitch_bands(base_.mesh(), shell_, stitching.rho);
+  // Rounded folds are where penetrations are blended, which lies off the faces.
+  if (stitching.folds == FoldMode::keep && !bands_.empty()) narrow_reaches(base_.mesh(), shell_, bands_);
   lay_fillets();
 }
 
