@@ -26,6 +26,14 @@ struct OfLaw {
   Vec3 across = Vec3::Zero();  ///< direction across the lay, where it was known last (object frame)
 };
 
+/// Where folds of a surface hold a point between them: how long what was last looked at there stays farther from the
+/// probe than the point is.
+struct HeldBetween {
+  Vec3 probe = Vec3::Zero();  ///< then (object frame)
+  double distance = 0.0;      ///< from there to the proxy (m): another one means another place, or a changed surface
+  double within = 0.0;        ///< while the probe is nearer than this to where it was (m); 0: not known
+};
+
 /// Of the surface: goes on while its mesh, its field or its formula does.
 struct OfSurface {
   std::uint64_t identity = 0;    ///< of that (surface_identity); 0: of none
@@ -37,6 +45,7 @@ struct OfSurface {
   int level = 0;
   bool rests = false;    ///< a point's proxy is at the first place
   bool sliding = false;  ///< friction was overcome there at the last tick
+  HeldBetween held;
 };
 
 /// What one probe remembers of one instance between ticks.
@@ -65,7 +74,7 @@ struct Contact {
     surface.places.push_back(place);
   }
 };
-static_assert(sizeof(Contact) <= 520);
+static_assert(sizeof(Contact) <= 560);
 
 /// Instances that one probe feels at once.
 inline constexpr std::size_t most_contacts = 8;
@@ -93,7 +102,7 @@ struct ProxyState {
   std::uint32_t open_ticks = 0;
   bool idle = false;  ///< the last tick ended before the proxy was at rest, and brought it no nearer
 };
-static_assert(sizeof(ProxyState) <= 4800);
+static_assert(sizeof(ProxyState) <= 5120);
 
 /// What a tick may remember of surfaces to be quick. Nothing in it changes an answer: it may be shared between probes
 /// of one thread, dropped or replaced at any tick.

@@ -373,13 +373,19 @@ double Coat::own_height(const CoatFrame& frame, double u, double v) const noexce
   const double least = triplanar_threshold * normal.squaredNorm();
   double sum = 0.0;
   double weight = 0.0;
+  double last = 0.0;
+  double last_weight = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double q = normal[axis] * normal[axis] - least;
     if (q <= 0.0) continue;
-    sum += q * q * frame.maps->height(seen_along(axis, point, tile), frame.level);
-    weight += q * q;
+    last = frame.maps->height(seen_along(axis, point, tile), frame.level);
+    last_weight = q * q;
+    sum += last_weight * last;
+    weight += last_weight;
   }
-  return sum / std::max(weight, std::numeric_limits<double>::min());
+  // Where one axis alone counts, it is what is seen along that.
+  if (last_weight == weight) return last;
+  return sum / weight;
 }
 
 void Coat::heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept {
@@ -399,71 +405,66 @@ void Coat::heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes
 
 namespace {
 
-/// Where a triplanar coat looks for the heights of four places, by axis of the place: as coordinates along s, and along
-/// t; and the weights of what is seen along each axis.
-struct TriplanarLooks {
-  Lanes s[3];
-  Lanes t[3];
-  Lanes weight[3];
-};
-
-ASPERITY_FOUR void triplanar_looks(const CoatFrame& frame, const Vec2& tile, const Lanes& at_u, const Lanes& at_v,
-                                   TriplanarLooks& looks) {
+/// Heights of a triplanar coat at four places, each as own_height answers it to the bit.
+ASPERITY_FOUR void triplanar_of_four(const CoatFrame& frame, const Lanes& at_u, const Lanes& at_v, Lanes& heights) {
   using four::Wide;
   Wide u;
   Wide v;
   std::memcpy(&u, at_u.data(), sizeof(u));
   std::memcpy(&v, at_v.data(), sizeof(v));
+  const Vec2& tile = frame.maps->tile();
+  Lanes s[3];
+  Lanes t[3];
   Wide squared[3];
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<int>(k);
     const Wide place = frame.point[axis] + u * frame.point_u[axis] + v * frame.point_v[axis];
-    const Wide s = place / tile.x();
-    const Wide t = tile.x() == tile.y() ? s : place / tile.y();
-    std::memcpy(looks.s[k].data(), &s, sizeof(s));
-    std::memcpy(looks.t[k].data(), &t, sizeof(t));
+    const Wide along_s = place / tile.x();
+    const Wide along_t = tile.x() == tile.y() ? along_s : place / tile.y();
+    std::memcpy(s[k].data(), &along_s, sizeof(along_s));
+    std::memcpy(t[k].data(), &along_t, sizeof(along_t));
     const Wide normal = frame.normal[axis] + u * frame.normal_u[axis] + v * frame.normal_v[axis];
     squared[k] = normal * normal;
   }
   const Wide least = triplanar_threshold * (squared[0] + squared[1] + squared[2]);
+  Wide sum{};
+  Wide total{};
+  Wide last{};
+  Wide last_weight{};
   for (std::size_t k = 0; k < 3; ++k) {
     const Wide above = squared[k] - least;
     const Wide share = above > 0.0 ? above : Wide{};
     const Wide weight = share * share;
-    std::memcpy(looks.weight[k].data(), &weight, sizeof(weight));
+    if (!(weight[0] + weight[1] + weight[2] + weight[3] > 0.0)) continue;
+    Lanes of_map;
+    frame.maps->heights(s[(k + 1) % 3], t[(k + 2) % 3], frame.level, of_map);
+    Wide height;
+    std::memcpy(&height, of_map.data(), sizeof(height));
+    sum += weight * height;
+    total += weight;
+    last = weight > 0.0 ? height : last;
+    last_weight = weight > 0.0 ? weight : last_weight;
   }
+  // Where one axis alone counts, it is what is seen along that.
+  const Wide mixed = sum / (total > 0.0 ? total : Wide{1.0, 1.0, 1.0, 1.0});
+  const Wide height = last_weight == total ? last : mixed;
+  std::memcpy(heights.data(), &height, sizeof(height));
 }
 
 #if defined(__x86_64__)
-[[gnu::target("avx2")]] void triplanar_looks_by_avx2(const CoatFrame& frame, const Vec2& tile, const Lanes& u,
-                                                     const Lanes& v, TriplanarLooks& looks) noexcept {
-  triplanar_looks(frame, tile, u, v, looks);
+[[gnu::target("avx2")]] void triplanar_by_avx2(const CoatFrame& frame, const Lanes& u, const Lanes& v,
+                                               Lanes& heights) noexcept {
+  triplanar_of_four(frame, u, v, heights);
 }
 #endif
 
 }  // namespace
 
 void Coat::triplanar_heights(const CoatFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) noexcept {
-  TriplanarLooks looks;
 #if defined(__x86_64__)
-  if (has_avx2())
-    triplanar_looks_by_avx2(frame, frame.maps->tile(), u, v, looks);
-  else
+  if (has_avx2()) return triplanar_by_avx2(frame, u, v, heights);
 #endif
-    triplanar_looks(frame, frame.maps->tile(), u, v, looks);
-  Lanes sum{};
-  Lanes total{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Lanes& weight = looks.weight[axis];
-    if (weight == Lanes{}) continue;
-    Lanes height;
-    frame.maps->heights(looks.s[(axis + 1) % 3], looks.t[(axis + 2) % 3], frame.level, height);
-    for (std::size_t i = 0; i < lanes; ++i) {
-      sum[i] += weight[i] * height[i];
-      total[i] += weight[i];
-    }
-  }
-  for (std::size_t i = 0; i < lanes; ++i) heights[i] = sum[i] / std::max(total[i], std::numeric_limits<double>::min());
+  triplanar_of_four(frame, u, v, heights);
 }
 
 HeightJet Coat::own_jet(const CoatFrame& frame, double u, double v) const noexcept {
@@ -479,11 +480,26 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
   HeightJet sum{};     // of w H
   HeightJet weight{};  // of w
   const double length = normal.squaredNorm();
+  const auto seen = [&](int axis) {
+    const HeightCurvature map = frame.maps->curvature(seen_along(axis, point, tile), frame.level);
+    return along(map, seen_along(axis, frame.point_u, tile), seen_along(axis, frame.point_v, tile));
+  };
+  double above[3];
+  int count = 0;
+  int last = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    above[axis] = normal[axis] * normal[axis] - triplanar_threshold * length;
+    if (above[axis] <= 0.0) continue;
+    ++count;
+    last = axis;
+  }
+  // Within 27 degrees of an axis its weight says nothing.
+  if (count == 1) return seen(last);
   const double length_u = normal.dot(frame.normal_u);
   const double length_v = normal.dot(frame.normal_v);
   for (int axis = 0; axis < 3; ++axis) {
     const double n = normal[axis];
-    const double q = n * n - triplanar_threshold * length;
+    const double q = above[axis];
     if (q <= 0.0) continue;
     const double nu = frame.normal_u[axis];
     const double nv = frame.normal_v[axis];
@@ -499,10 +515,7 @@ HeightJet Coat::triplanar_jet(const CoatFrame& frame, double u, double v) const 
                         2.0 * (q_u * q_u + q * q_uu),
                         2.0 * (q_u * q_v + q * q_uv),
                         2.0 * (q_v * q_v + q * q_vv)};
-    const HeightCurvature map = frame.maps->curvature(seen_along(axis, point, tile), frame.level);
-    const Vec2 st_u = seen_along(axis, frame.point_u, tile);
-    const Vec2 st_v = seen_along(axis, frame.point_v, tile);
-    sum.add(product(own, along(map, st_u, st_v)));
+    sum.add(product(own, seen(axis)));
     weight.add(own);
   }
   return quotient(sum, weight, 1.0 / std::max(weight.height, std::numeric_limits<double>::min()));

@@ -189,12 +189,13 @@ class Walk {
   template <class Start>
   int look_ahead(const Start& start, const WalkStep& step, double far, int count, double& distance) noexcept {
     int seen = 0;
+    const double per = far / count;
     while (true) {
       Lanes u;
       Lanes v;
       for (std::size_t i = 0; i < lanes; ++i) {
         const int sample = std::min(seen + 1 + static_cast<int>(i), count - 1);
-        const Vec2 to = chart_.moved(start, step, far * sample / count, -1);
+        const Vec2 to = chart_.moved(start, step, per * sample, -1);
         u[i] = to.x();
         v[i] = to.y();
       }
@@ -219,7 +220,7 @@ class Walk {
     const int seen = look_ahead(start, step, far, count, distance);
     if (seen == count - 1 && attempt(far, border)) return true;
     if (seen == 0) return false;
-    const auto to = chart_.moved(start, step, far * seen / count, -1);
+    const auto to = chart_.moved(start, step, far / count * seen, -1);
     ++moves_;
     Spot there;
     chart_.evaluate(to, there);

@@ -257,6 +257,72 @@ RC_GTEST_PROP(BudgetInvariants, the_proxy_never_moves_away_from_the_probe, (std:
   }
 }
 
+/// Two rough sheets that cross at 90 degrees along the y axis, as one surface: a groove with creases between folds that
+/// do not belong together.
+Scene crossing_sheets() {
+  MeshSource sheets;
+  for (const double turn : {0.25, -0.25}) {
+    const MeshSource one = plane_grid(0.04, 0.04, 13, 13);
+    const Eigen::AngleAxisd turned(turn * std::numbers::pi, Vec3::UnitY());
+    const auto first = static_cast<std::uint32_t>(sheets.positions.size());
+    for (const Vec3& p : one.positions) sheets.positions.push_back(turned * p);
+    for (const auto& corners : one.triangles)
+      sheets.triangles.push_back({corners[0] + first, corners[1] + first, corners[2] + first});
+  }
+  Rng rng(3);
+  constexpr int texels = 64;
+  const auto noise = tabulated(texels, texels, [&](const Vec2&) { return rng.uniform(-4e-4, 4e-4); });
+  const auto relief = relief_on(
+      mesh_of(std::move(sheets)),
+      {tiled(must(HeightMap::build(noise, texels, texels, Wrap::repeat, Reconstruction::quadratic_bspline)), 0.01)},
+      CoatSettings{Mapping::triplanar});
+  EXPECT_TRUE(relief->overlaps());
+  return must(Scene::build({instance_of(relief)}, 0.0));
+}
+
+TEST(BetweenFolds, what_holds_it_is_not_searched_again_and_holds_it_where_a_search_does) {
+  const Scene scene = crossing_sheets();
+  ProxyState state;
+  ProxyCache cache;
+  std::size_t in_crease = 0;
+  std::size_t held = 0;
+  std::uint64_t work_held = 0;
+  std::uint64_t work_searched = 0;
+  double most_apart = 0.0;
+  double most_farther = 0.0;
+  for (int i = 0; i < 6000; ++i) {
+    const double along = std::max(0, i - 600) * 1e-6;
+    const Vec3 p(2e-4 * std::sin(1e-2 * i), along - 0.004, std::max(-8e-3, 6e-3 - 3e-5 * i));
+    ProxyState searching = state;
+    bool knows = false;
+    for (Contact& contact : searching.contacts) {
+      knows = knows || contact.surface.held.within > 0.0;
+      contact.surface.held = {};
+    }
+    const Vec3 before = state.proxy;
+    step(scene, state, cache, probe_at(p), tick);
+    const std::uint32_t work = cache.work().done().sum();
+    ProxyCache own;
+    step(scene, searching, own, probe_at(p), tick);
+    in_crease += !state.contacts.empty() && state.contacts[0].surface.places.size() > 1 ? 1U : 0U;
+    if (!knows || state.proxy != before || work > 8) {
+      EXPECT_EQ(state.proxy, searching.proxy) << i;
+      continue;
+    }
+    ++held;
+    work_held += work;
+    work_searched += own.work().done().sum();
+    most_apart = std::max(most_apart, (state.proxy - searching.proxy).norm());
+    most_farther = std::max(most_farther, (state.proxy - p).norm() - (searching.proxy - p).norm());
+  }
+  EXPECT_GE(in_crease, 5000U);
+  EXPECT_GE(held, 4000U);
+  EXPECT_LE(work_held, work_searched / 100);
+  // Of texels of 156 um.
+  EXPECT_LE(most_apart, 1e-5);
+  EXPECT_LE(most_farther, 1e-7);
+}
+
 TEST(BudgetSettings, ABallAndAPointHaveTheirOwn) {
   EXPECT_EQ(must(Scene::build({instance_of(rough_ball())}, 0.0)).budget(), SceneSettings::budget_for(0.0));
   EXPECT_EQ(must(Scene::build({instance_of(rough_ball())}, 1e-3)).budget(), 0U);

@@ -64,7 +64,7 @@ class PointProxy {
       if (pinched(start)) start = spot_.point;
       if (flies_in_vain()) break;
       if (work_.spent()) break;
-      if (!fly(start)) return free();
+      if (!fly(start, place_.element)) return free();
     }
     return resting(false);
   }
@@ -85,17 +85,25 @@ class PointProxy {
 
   void leave() noexcept {
     state_.rests = state_.sliding = false;
+    state_.held = {};
     if constexpr (may_overlap) flanks_.clear();
   }
 
-  /// Straight to the probe through free space. False when nothing is in the way.
-  bool fly(const Vec3& from) noexcept {
+  /// Straight to the probe through free space, from this element if it is known. False when nothing is in the way.
+  bool fly(const Vec3& from, std::uint32_t starts_on = no_index) noexcept {
     leave();
-    const SweptHit hit = view_.first_touch({from, probe_}, sides_);
+    const SweptHit hit = first_touch({from, probe_}, starts_on);
     if (!hit.hit || hit.contact.normal.isZero()) return false;
     take(hit);
     state_.rests = true;
     return true;
+  }
+
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, std::uint32_t starts_on) const noexcept {
+    if constexpr (requires { view_.first_touch(motion, sides_, starts_on); })
+      return view_.first_touch(motion, sides_, starts_on);
+    else
+      return view_.first_touch(motion, sides_);
   }
 
   /// Whether it does not get away from where it is by flying to and fro.
@@ -152,7 +160,7 @@ class PointProxy {
   /// Sticks, or slides as far as friction and what lies in the way let it.
   DescentEnd settle() noexcept {
     if constexpr (may_overlap) {
-      if (view_.overlaps()) return settle_over_folds();
+      if (view_.overlaps()) return still_held() ? DescentEnd::rest : settle_over_folds();
     }
     return settle_on_fold();
   }
@@ -171,6 +179,13 @@ class PointProxy {
 
   /// What the last tick left it beside.
   void recall_flanks() noexcept;
+
+  /// Whether the folds that it rests between hold it still: the probe has moved by less than would bring anything
+  /// nearer that was looked at before.
+  [[nodiscard]] bool still_held() noexcept;
+  /// It looked at a place that is no nearer to the probe than where it stands.
+  void not_nearer(const Vec3& there, const Vec3& stands) noexcept;
+  void hold() noexcept;
 
   /// How far from a fold it touches it, as walks find that (m).
   [[nodiscard]] double room_beside() const noexcept {
@@ -278,13 +293,14 @@ class PointProxy {
   const WorkMeter& work_;
   Place place_;
   Spot spot_;
-  FixedVector<Fold, 2> flanks_;  ///< the others
-  std::optional<Fold> kink_;     ///< where one of them had turned to over an edge when they were last led to a point
-  bool kink_rises_ = false;      ///< over where it had been
-  int moves_ = 0;                ///< between overlapping folds
-  int learned_ = 0;              ///< folds found where it stands
-  int in_vain_ = 0;              ///< flights that came hardly nearer
-  double left_at_ = infinity;    ///< distance from the probe where it flew off last
+  FixedVector<Fold, 2> flanks_;    ///< the others
+  std::optional<Fold> kink_;       ///< where one of them had turned to over an edge when they were last led to a point
+  bool kink_rises_ = false;        ///< over where it had been
+  int moves_ = 0;                  ///< between overlapping folds
+  int learned_ = 0;                ///< folds found where it stands
+  double held_within_ = infinity;  ///< how far the probe may go before one of the places looked at would be nearer (m)
+  int in_vain_ = 0;                ///< flights that came hardly nearer
+  double left_at_ = infinity;      ///< distance from the probe where it flew off last
 };
 
 }  // namespace asperity

@@ -94,6 +94,7 @@ bool PointProxy<View>::search_along(const Folds& from, Vec3 step, Folds& on) noe
     on = from;
     const bool meet = onto(on, spot_.point + step);
     if (meet && nearer(on[0].spot, spot_)) return true;
+    if (meet) not_nearer(on[0].spot.point, spot_.point);
     double share = shorter;
     if (kink_) {
       // It turns a corner on the way, most likely that.
@@ -131,7 +132,10 @@ auto PointProxy<View>::go_along(const PlaneProjection& held, const Vec3& step) n
   if (hit.hit) {
     const Fold met{place_of(hit), view_.at(place_of(hit), hit.side * hit.contact.normal)};
     // Where it stands it touches another one.
-    if (!nearer(met.spot, spot_)) return learn(met) ? Way::on : Way::stuck;
+    if (!nearer(met.spot, spot_)) {
+      not_nearer(met.spot.point, spot_.point);
+      return learn(met) ? Way::on : Way::stuck;
+    }
     lead_by(met);
     stay_beside(on);
     return Way::on;

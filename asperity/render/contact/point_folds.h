@@ -14,8 +14,10 @@ DescentEnd PointProxy<View>::settle_over_folds() noexcept {
   constexpr double growth = 4.0;
   double grains = least_grains;
   learned_ = 0;
+  state_.held = {};
   recall_flanks();
   for (int move = 0; move < most_moves && moves_ < most_moves_of_tick && !work_.spent(); ++move, ++moves_) {
+    held_within_ = infinity;
     PlaneSet planes;
     planes.push_back(plane_through(spot_.point, normal()));
     for (const Fold& flank : flanks_) planes.push_back(plane_through(flank.spot.point, flank.normal()));
@@ -33,7 +35,9 @@ DescentEnd PointProxy<View>::settle_over_folds() noexcept {
         flanks_ = flanks;
         return DescentEnd::rest;
       }
-      return way == Way::free ? end : DescentEnd::rest;
+      if (way == Way::free) return end;
+      hold();
+      return DescentEnd::rest;
     }
     Vec3 way = along_crease(held) - spot_.point;
     const double most = grains * view_.grain();
@@ -43,10 +47,41 @@ DescentEnd PointProxy<View>::settle_over_folds() noexcept {
     const Way end = go_along(held, way);
     if (end == Way::on) continue;
     const double gain = distance - (spot_.point - probe_).norm();
+    if (end == Way::stuck) hold();
     if (end == Way::stuck || gain <= worth_going_on()) return DescentEnd::rest;
     grains = std::min(most_grains, growth * grains);
   }
   return DescentEnd::limited;
+}
+
+template <SurfaceView View>
+bool PointProxy<View>::still_held() noexcept {
+  const HeldBetween& held = state_.held;
+  if (!state_.rests || !((probe_ - held.probe).norm() < held.within) ||
+      (spot_.point - held.probe).norm() != held.distance)
+    return false;
+  flanks_.clear();
+  for (std::size_t i = 1; i < state_.places.size(); ++i) flanks_.push_back({state_.places[i], {}});
+  return true;
+}
+
+template <SurfaceView View>
+void PointProxy<View>::not_nearer(const Vec3& there, const Vec3& stands) noexcept {
+  const Vec3 way = there - stands;
+  const double length = way.norm();
+  // What is farther by this much, squared, is so until the probe has gone that far towards it.
+  const double farther = way.dot(there + stands - 2.0 * probe_);
+  if (length > 0.0) held_within_ = std::min(held_within_, std::max(0.0, 0.5 * farther / length));
+}
+
+template <SurfaceView View>
+void PointProxy<View>::hold() noexcept {
+  // The places looked at are few, and where folds do not meet is known for this direction of the pull alone.
+  constexpr double sure_of = 0.3;
+  constexpr double most_turn = 0.01;
+  if (!(held_within_ < infinity) || work_.spent()) return;
+  const double distance = (spot_.point - probe_).norm();
+  state_.held = {probe_, distance, std::min(sure_of * held_within_, most_turn * distance)};
 }
 
 template <SurfaceView View>
@@ -145,6 +180,7 @@ auto PointProxy<View>::go(DescentEnd& end) noexcept -> Way {
     }
   }
   if (!nearer(spot_, from.spot)) {
+    not_nearer(spot_.point, from.spot.point);
     lead_by(from);
     return nearer(spot_, begin) ? Way::on : Way::stuck;
   }
@@ -189,7 +225,10 @@ auto PointProxy<View>::along_flank(std::size_t known) noexcept -> Way {
   held.active.push_back({0, 0.5 * (held.point - probe_).norm()});
   held.active.push_back({known + 1, 0.5 * (held.point - probe_).norm()});
   Vec3 step = along_crease(held) - spot_.point;
-  if (!(step.norm() > rest_along_crease())) return Way::stuck;
+  if (!(step.norm() > rest_along_crease())) {
+    held_within_ = std::min(held_within_, rest_along_crease() - step.norm());
+    return Way::stuck;
+  }
   if (step.norm() > view_.grain()) step *= view_.grain() / step.norm();
   return go_along(held, step) == Way::stuck ? Way::stuck : Way::on;
 }

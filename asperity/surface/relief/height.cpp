@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
+#include "asperity/core/processor.h"
+#include "asperity/surface/detail/four.h"
 #include "asperity/surface/relief/detail/partners.h"
 #include "asperity/surface/relief/surface.h"
 
@@ -38,20 +41,45 @@ void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, cons
   }
 }
 
+namespace {
+
+/// Of the shell's points at four places from a point, squared.
+ASPERITY_FOUR void squares_of_four(const ShellPrism& prism, const Lanes& at_u, const Lanes& at_v,
+                                   const Lanes& at_height, const Vec3& from, Lanes& squares) {
+  using four::Wide;
+  Wide u;
+  Wide v;
+  Wide height;
+  std::memcpy(&u, at_u.data(), sizeof(u));
+  std::memcpy(&v, at_v.data(), sizeof(v));
+  std::memcpy(&height, at_height.data(), sizeof(height));
+  Wide sum{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Wide base = prism.corner[axis] + u * prism.edge_u[axis] + v * prism.edge_v[axis];
+    const Wide direction = prism.direction[axis] + u * prism.turn_u[axis] + v * prism.turn_v[axis];
+    const Wide off = base + height * direction - from[axis];
+    sum += off * off;
+  }
+  std::memcpy(squares.data(), &sum, sizeof(sum));
+}
+
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void squares_by_avx2(const ShellPrism& prism, const Lanes& u, const Lanes& v,
+                                             const Lanes& heights, const Vec3& from, Lanes& squares) noexcept {
+  squares_of_four(prism, u, v, heights, from, squares);
+}
+#endif
+
+}  // namespace
+
 void ReliefSurface::squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& from,
                                       Lanes& squares) const noexcept {
   Lanes heights;
   heights_alone(frame, u, v, heights);
-  const ShellPrism& prism = frame.prism;
-  squares = {};
-  for (int axis = 0; axis < 3; ++axis) {
-    for (std::size_t i = 0; i < lanes; ++i) {
-      const double base = prism.corner[axis] + u[i] * prism.edge_u[axis] + v[i] * prism.edge_v[axis];
-      const double direction = prism.direction[axis] + u[i] * prism.turn_u[axis] + v[i] * prism.turn_v[axis];
-      const double off = base + heights[i] * direction - from[axis];
-      squares[i] += off * off;
-    }
-  }
+#if defined(__x86_64__)
+  if (has_avx2()) return squares_by_avx2(frame.prism, u, v, heights, from, squares);
+#endif
+  squares_of_four(frame.prism, u, v, heights, from, squares);
 }
 
 HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {

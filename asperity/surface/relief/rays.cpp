@@ -95,7 +95,7 @@ bool clip_to_hull(const ReliefSurface& surface, std::uint32_t face, const ShellP
 class PatchRay {
  public:
   PatchRay(const ReliefSurface& surface, std::uint32_t face, const ShellPrism& prism, const CoatMoment& moment,
-           const Segment& segment, Sides sides, const HullPart& part) noexcept
+           const Segment& segment, Sides sides, const HullPart& part, bool starts_on_it) noexcept
       : surface_(surface),
         face_(face),
         prism_(prism),
@@ -104,6 +104,7 @@ class PatchRay {
         way_(segment.to - segment.from),
         sides_(sides),
         part_(part),
+        starts_on_it_(starts_on_it),
         range_(surface.range(face)),
         per_height_(std::sqrt(prism.edge_u.cross(prism.edge_v).norm())) {}
 
@@ -116,11 +117,12 @@ class PatchRay {
 
   PatchHit first() noexcept {
     PatchHit best;
-    Piece stack[deepest_part + 2];
+    Piece stack[deepest_part + 3];
     int top = 0;
-    stack[top++] = {at(part_.from, guess(part_.from)), at(part_.to, guess(part_.to)), 0};
+    stack[top++] = {at(part_.from, guess(part_.from)), at(part_.to, guess(part_.to)), 0, first_look()};
     while (top > 0) {
       Piece piece = stack[--top];
+      if (piece.look > 0.0 && split_off_look(piece, stack[top])) ++top;
       Share share;
       ShellPlace bend;
       const Way way = look_beside(piece, bend, share.bulge);
@@ -141,8 +143,8 @@ class PatchRay {
       }
       const Moment middle = halfway(piece, share.bulge);
       // The earlier half first.
-      stack[top++] = {middle, piece.to, piece.level + 1};
-      stack[top++] = {piece.from, middle, piece.level + 1};
+      stack[top++] = {middle, piece.to, piece.level + 1, 0.0};
+      stack[top++] = {piece.from, middle, piece.level + 1, 0.0};
     }
     return {};
   }
@@ -159,6 +161,7 @@ class PatchRay {
     Moment from;
     Moment to;
     int level = 0;
+    double look = 0.0;  ///< time from its begin to where it is to be split before anything is known of it, or 0
   };
 
   /// Where a piece of the curve goes: nowhere over the face or within its heights, somewhere there, or how it bends is
@@ -171,6 +174,36 @@ class PatchRay {
     double to = 1.0;
     ShellPlace bulge;
   };
+
+  /// A motion that starts on the relief mostly meets it again at once: halving what goes on as far as the face does, to
+  /// come down to that, would take a bound each time. So the first strip is looked at first, then what is four times as
+  /// long, and so on. In time; 0 where it is not so.
+  [[nodiscard]] double first_look() const noexcept {
+    if (!starts_on_it_) return 0.0;
+    const double rise = std::abs(part_.rate.z() / part_.rise) / per_height_;
+    const double rate = std::max({std::abs(part_.rate.x() - part_.shear.x() * part_.rate.z()),
+                                  std::abs(part_.rate.y() - part_.shear.y() * part_.rate.z()), rise});
+    constexpr double within_strip = 0.95;
+    const double look = within_strip * strip_leaves * std::ldexp(1.0, -leaf()) / rate;
+    constexpr double beside_start = 4.0;
+    return part_.from <= beside_start * look ? look : 0.0;
+  }
+
+  /// Splits a piece where that is to be done, off its `rest`. False where it is short already.
+  [[nodiscard]] bool split_off_look(Piece& piece, Piece& rest) const noexcept {
+    constexpr double worth_it = 0.6;
+    constexpr double grown = 4.0;
+    const double look = piece.look;
+    piece.look = 0.0;
+    if (!piece.from.reached || !(look < worth_it * (piece.to.t - piece.from.t))) return false;
+    const double t = piece.from.t + look;
+    const Moment middle =
+        at(t, piece.to.reached ? along(piece.from, piece.to, look / (piece.to.t - piece.from.t)) : guess(t));
+    if (!middle.reached) return false;
+    rest = {middle, piece.to, piece.level, grown * look};
+    piece.to = middle;
+    return true;
+  }
 
   /// As if all directions were their mean.
   [[nodiscard]] ShellPlace guess(double t) const noexcept {
@@ -561,6 +594,7 @@ class PatchRay {
   Vec3 way_;
   Sides sides_;
   HullPart part_;
+  bool starts_on_it_;  ///< the motion, on the relief of this face or of one beside it
   HeightRange range_;  ///< of the heights over all of the face
   Moment last_end_{-1.0, {}, infinity, false};
   bool coming_up_ = false;  ///< started less than a skin below the relief, and has been nowhere over it yet
@@ -573,8 +607,8 @@ class PatchRay {
 }  // namespace
 
 template <class Skip>
-SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& skip,
-                               std::uint32_t likely) const noexcept {
+SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& skip, std::uint32_t likely,
+                               std::uint32_t starts_on) const noexcept {
   SweptHit best;
   const Vec3 way = motion.to - motion.from;
   if (!(way.squaredNorm() > 0.0)) return best;
@@ -585,7 +619,7 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
     HullPart part;
     const ShellPrism prism = surface_->shell().prism(surface_->base().mesh(), face);
     if (!clip_to_hull(*surface_, face, prism, motion, best.t, part)) return best.t;
-    PatchRay ray(*surface_, face, prism, moment_, motion, sides, part);
+    PatchRay ray(*surface_, face, prism, moment_, motion, sides, part, starts_on != no_index);
     const PatchHit hit = ray.first();
     count += ray.count();
     if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
@@ -611,8 +645,9 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
   return best;
 }
 
-SweptHit ReliefView::first_touch(const Segment& motion, Sides sides) const noexcept {
-  return first_met(motion, sides, [](std::uint32_t) { return false; });
+SweptHit ReliefView::first_touch(const Segment& motion, Sides sides, std::uint32_t starts_on) const noexcept {
+  return first_met(
+      motion, sides, [](std::uint32_t) { return false; }, starts_on, starts_on);
 }
 
 SweptHit ReliefView::beside(std::span<const std::uint32_t> faces, const Segment& moved, Sides sides,
@@ -624,7 +659,7 @@ SweptHit ReliefView::beside(std::span<const std::uint32_t> faces, const Segment&
     return std::any_of(faces.begin(), faces.end(),
                        [&](std::uint32_t other) { return share_vertex(triangles[face], triangles[other]); });
   };
-  return first_met(moved, sides, skip, likely);
+  return first_met(moved, sides, skip, likely, no_index);
 }
 
 }  // namespace asperity

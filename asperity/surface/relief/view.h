@@ -20,8 +20,9 @@ class ReliefView {
   ReliefView(const ReliefSurface& surface, const CoatMoment& moment, SurfaceCache& cache) noexcept
       : surface_(&surface), moment_(moment), cache_(&cache) {}
 
-  /// No relief, however thin, is stepped over.
-  [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
+  /// No relief, however thin, is stepped over. `starts_on`: the face on whose relief the motion starts, if it does.
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides,
+                                     std::uint32_t starts_on = no_index) const noexcept;
   /// Whether folds overlap in space; and then what a point meets that keeps to some of them, from places on these faces
   /// to others, moved a skin off them: of the rest, for what belongs to the faces, or shares a vertex with one of them,
   /// is not met. `likely`: what it may meet at once, if anything is known of that; looked at first.
@@ -87,7 +88,7 @@ class ReliefView {
   [[nodiscard]] Vec3 way_off(const Place& place, const ReliefPoint& spot) const noexcept;
   template <class Skip>
   [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip,
-                                   std::uint32_t likely = no_index) const noexcept;
+                                   std::uint32_t likely, std::uint32_t starts_on) const noexcept;
 
   const ReliefSurface* surface_;
   CoatMoment moment_;
