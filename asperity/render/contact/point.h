@@ -47,6 +47,8 @@ class PointProxy {
         const bool limited = end == DescentEnd::limited && !work_.spent();
         if (near || between || limited || end == DescentEnd::blocked) return {.simple = false};
       }
+      // A walk has a limit of its own.
+      if (end == DescentEnd::limited && !work_.spent() && !stays()) continue;
       if (end != DescentEnd::left && end != DescentEnd::rim) return resting(end != DescentEnd::limited);
       if (end == DescentEnd::left && friction_.grip > 0.0 && holds_on()) {
         PointRest rest = resting(true);
@@ -62,7 +64,7 @@ class PointProxy {
       // Where there is no place to fly from it stays.
       if (!view_.launch(place_, spot_, start)) return resting(true);
       if (pinched(start)) start = spot_.point;
-      if (flies_in_vain()) break;
+      if (stays()) return end == DescentEnd::rim ? held_by_rim() : resting(true);
       if (work_.spent()) break;
       if (!fly(start, place_.element)) return free();
     }
@@ -90,37 +92,15 @@ class PointProxy {
   }
 
   /// Straight to the probe through free space, from this element if it is known. False when nothing is in the way.
-  bool fly(const Vec3& from, std::uint32_t starts_on = no_index) noexcept {
-    leave();
-    const SweptHit hit = first_touch({from, probe_}, starts_on);
-    if (!hit.hit || hit.contact.normal.isZero()) return false;
-    take(hit);
-    state_.rests = true;
-    return true;
-  }
-
-  [[nodiscard]] SweptHit first_touch(const Segment& motion, std::uint32_t starts_on) const noexcept {
-    if constexpr (requires { view_.first_touch(motion, sides_, starts_on); })
-      return view_.first_touch(motion, sides_, starts_on);
-    else
-      return view_.first_touch(motion, sides_);
-  }
-
-  /// Whether it does not get away from where it is by flying to and fro.
-  [[nodiscard]] bool flies_in_vain() noexcept {
-    constexpr int most_in_vain = 3;
-    constexpr double least_share = 1e-3;
-    const double distance = (spot_.point - probe_).norm();
-    in_vain_ = distance > (1.0 - least_share) * left_at_ ? in_vain_ + 1 : 0;
-    left_at_ = distance;
-    return in_vain_ == most_in_vain;
-  }
-
+  bool fly(const Vec3& from, std::uint32_t starts_on = no_index) noexcept;
+  [[nodiscard]] SweptHit first_touch(const Segment& motion, std::uint32_t starts_on) const noexcept;
+  /// Whether it has come no nearer for some time, by flying to and fro or by walking: what it flies from and what it
+  /// meets then hold it between them.
+  [[nodiscard]] bool stays() noexcept;
   /// Whether another fold lies between where it is and where it would fly from.
-  [[nodiscard]] bool pinched(const Vec3& start) const noexcept {
-    if constexpr (may_overlap) return view_.overlaps() && view_.first_touch({spot_.point, start}, sides_).hit;
-    return false;
-  }
+  [[nodiscard]] bool pinched(const Vec3& start) const noexcept;
+  /// What goes off a rim only to meet the surface again is held by the rim.
+  [[nodiscard]] PointRest held_by_rim() noexcept;
 
   [[nodiscard]] static Place place_of(const SweptHit& hit) noexcept {
     return {hit.contact.element, hit.side < 0.0, hit.contact.at};
@@ -299,8 +279,8 @@ class PointProxy {
   int moves_ = 0;                  ///< between overlapping folds
   int learned_ = 0;                ///< folds found where it stands
   double held_within_ = infinity;  ///< how far the probe may go before one of the places looked at would be nearer (m)
-  int in_vain_ = 0;                ///< flights that came hardly nearer
-  double left_at_ = infinity;      ///< distance from the probe where it flew off last
+  int in_vain_ = 0;                ///< flights, or walks, that came hardly nearer
+  double left_at_ = infinity;      ///< distance from the probe where one of them began last
 };
 
 }  // namespace asperity

@@ -2,7 +2,7 @@
 // The proxy law where a point is between folds of a surface that overlaps itself in space: along the creases where they
 // meet.
 
-#include "asperity/render/contact/point.h"
+#include "asperity/render/contact/point_flights.h"
 
 namespace asperity {
 
