@@ -87,8 +87,8 @@ class ReliefView {
   /// Unit direction that leads off a place, on its side, and away from all faces around it.
   [[nodiscard]] Vec3 way_off(const Place& place, const ReliefPoint& spot) const noexcept;
   template <class Skip>
-  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip,
-                                   std::uint32_t likely, std::uint32_t starts_on) const noexcept;
+  [[nodiscard]] SweptHit first_met(const Segment& motion, Sides sides, const Skip& skip, std::uint32_t likely,
+                                   std::uint32_t starts_on) const noexcept;
 
   const ReliefSurface* surface_;
   CoatMoment moment_;
