@@ -163,6 +163,37 @@ TEST(GodObject, WildJumpsNeverCarryTheProxyInside) {
   }
 }
 
+// A skin off one side of a sharp valley, at its bottom, is behind the other side: no way may begin there.
+TEST(GodObject, WildJumpsInASharpValleyNeverCarryTheProxyBehindIt) {
+  Rng rng(8);
+  for (int m = 0; m < 20; ++m) {
+    const double half_angle = rng.uniform(0.1, 0.7);
+    const Vec3 left(-std::sin(half_angle), 0.0, std::cos(half_angle));
+    const Vec3 right(std::sin(half_angle), 0.0, std::cos(half_angle));
+    MeshSource valley;
+    for (const double y : {-1.0, 1.0}) {
+      for (const Vec3& side : {left, Vec3(Vec3::Zero()), right}) valley.positions.push_back(Vec3(0.0, y, 0.0) + side);
+    }
+    valley.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
+    Instance instance;
+    instance.surface = surface_of(std::move(valley));
+    instance.sides = Sides::both;
+    instance.material.stiffness = stiffness;
+    const double skin = std::get<std::shared_ptr<const MeshSurface>>(instance.surface)->skin();
+    const Scene scene = Scene::build({instance}, 0.0).value();
+    ProxyState state;
+    step(scene, state, at(Vec3(0.0, 0.0, 0.1)), tick);
+    const Vec3 inward_of_left(std::cos(half_angle), 0.0, std::sin(half_angle));
+    const Vec3 inward_of_right(-std::cos(half_angle), 0.0, std::sin(half_angle));
+    for (int i = 0; i < 5000; ++i) {
+      const double reach = rng.below(3) == 0 ? 0.2 : 0.03;
+      step(scene, state, at(reach * rng.uniform() * random_direction(rng)), tick);
+      ASSERT_GE(state.proxy.dot(inward_of_left), -2.0 * skin) << "valley " << m << ", tick " << i;
+      ASSERT_GE(state.proxy.dot(inward_of_right), -2.0 * skin) << "valley " << m << ", tick " << i;
+    }
+  }
+}
+
 TEST(GodObject, ThinOpenSheetIsNeverPassedAtAnySpeed) {
   const auto sheet = surface_of(plane_grid(0.1, 0.1, 2048));
   Rng rng(4);
@@ -242,6 +273,58 @@ TEST(GodObject, ProxyIsALocalMinimumOfItsDistanceToTheProbe) {
       }
     }
   }
+}
+
+// A point is led along the faces, and what holds it on an edge or at a vertex is known from the faces around. The same
+// answer comes of asking for all that it touches, move after move, as several surfaces need it.
+TEST(GodObject, OnEdgesAndAtVerticesItIsHeldAsByAllThatItTouches) {
+  Rng rng(6);
+  int ticks = 0;
+  int differ = 0;
+  int on_edge = 0;
+  int at_vertex = 0;
+  for (int m = 0; m < 12; ++m) {
+    const auto surface = surface_of(random_closed_mesh(rng.next(), 3, 0.05, rng.uniform(0.2, 0.5)));
+    const double edge = surface->mesh().mean_edge();
+    Pose pose;
+    if (m % 2 == 1) pose = {Vec3(0.02, -0.03, 0.01), Quat(Eigen::AngleAxisd(0.7, random_direction(rng)))};
+    const Scene scene = scene_of(surface, 0.0, pose);
+    ProxyState state;
+    Vec3 probe = 0.1 * random_direction(rng);
+    Vec3 heading = random_direction(rng);
+    for (int i = 0; i < 4000; ++i) {
+      if (rng.below(60) == 0) heading = random_direction(rng);
+      probe += 0.03 * edge * heading - 0.002 * probe;
+      const Vec3 before = state.proxy;
+      ProxyState touching_all = state;
+      if (!touching_all.contacts.empty()) {
+        // Held by two planes that do not meet, it is not led by itself.
+        OfSurface& contact = touching_all.contacts[0].surface;
+        contact.rests = false;
+        while (!contact.places.empty() && contact.places.size() < 2) contact.places.push_back(contact.places[0]);
+      }
+      const ForceSample force = step(scene, state, at(probe), tick);
+      const ForceSample expected = step(scene, touching_all, at(probe), tick);
+      const std::size_t places = state.contacts.empty() ? 0 : state.contacts[0].surface.places.size();
+      on_edge += places == 2 ? 1 : 0;
+      at_vertex += places == 3 ? 1 : 0;
+      const double distance = (state.proxy - probe).norm();
+      const double of_all = (touching_all.proxy - probe).norm();
+      const bool same = (force.wrench.force - expected.wrench.force).norm() <= 1e-5 * stiffness * edge;
+      ++ticks;
+      differ += same ? 0 : 1;
+      // Where it slips off what held it the two may come to different hollows. Elsewhere all that it touches may hold
+      // it at a vertex, though it would go on along an edge.
+      const bool slips = std::max((state.proxy - before).norm(), (touching_all.proxy - before).norm()) > 0.1 * edge;
+      EXPECT_TRUE(same || slips || distance < of_all)
+          << "mesh " << m << ", tick " << i << ", " << places << " places: " << distance << " in place of " << of_all
+          << " m from the probe";
+      ASSERT_EQ(unfinished(force.flags), unfinished(expected.flags)) << "mesh " << m << ", tick " << i;
+    }
+  }
+  EXPECT_LE(differ, ticks / 1000);
+  EXPECT_GT(on_edge, 2000);
+  EXPECT_GT(at_vertex, 500);
 }
 
 TEST(GodObject, PoseOfTheInstanceTurnsTheForceWithIt) {

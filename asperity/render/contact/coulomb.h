@@ -31,12 +31,13 @@ inline bool no_farther(const Vec3& to, const Vec3& from, const Vec3& probe) noex
 
 /// Where the proxy of a point came to rest.
 struct PointRest {
-  bool simple = true;  ///< false: more than one plane may hold it, and nothing else here is known
+  bool simple = true;  ///< false: more than one plane may hold it, and nothing but on_edge is known
   bool contact = false;
   bool converged = true;
   bool pulls = false;          ///< the probe is outside, and a sticky surface holds on to it
   Vec3 proxy = Vec3::Zero();   ///< m
   Vec3 normal = Vec3::Zero();  ///< unit, on the side touched
+  bool on_border = false;      ///< not simple: on an edge or a vertex, held by the faces around
 };
 
 }  // namespace asperity

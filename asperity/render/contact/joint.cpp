@@ -407,6 +407,23 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
   return solution;
 }
 
+ConstraintSolution JointSolve::on_border(const Place& place, const Vec3& goal) const noexcept {
+  // In valleys that are sharper a skin off all sides is elsewhere.
+  constexpr double most_skins = 4.0;
+  ConstraintSolution solution;
+  const Entry& entry = entries_[0];
+  ContactSet around;
+  std::get_if<TriangleView>(&entry.touch->view)->beside_border(place, around);
+  if (around.empty()) return solution;
+  for (const Foot& foot : around) solution.planes.push_back(plane_of(0, foot));
+  solution.proxy = project_onto_planes(goal, solution.planes, true).point;
+  solution.projection = project_onto_planes(goal, solution.planes, false);
+  const Vec3 border = entry.touch->to_world(around[0].point);
+  solution.converged =
+      solution.projection.active.size() > 1 && (solution.proxy - border).norm() <= most_skins * entry.skin;
+  return solution;
+}
+
 /// Of a proxy that is not at rest: what each of the planes around it would hold where it is now.
 void JointSolve::share_out(const Vec3& goal, ConstraintSolution& solution) noexcept {
   const Vec3& proxy = solution.proxy;

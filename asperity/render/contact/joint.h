@@ -29,8 +29,11 @@ class JointSolve {
   /// active); a motion there that passes nothing. Among smooth surfaces the ball is pushed out of what it meets, and a
   /// motion is accepted only where it ends nearer to the goal. [servo]
   ConstraintSolution solve(const Vec3& from, const Vec3& goal) noexcept;
-  /// The same with the friction of the plane that pushes most: each round leads the proxy to the probe as far as the
-  /// cone lets it go. `goal` becomes where a proxy without friction would have been led. [servo]
+  /// A point led along one mesh to an edge or a vertex, where no friction holds it: by the planes of the faces around.
+  /// Not converged where they do not hold it there, or are not known to be all; `solve` is to be asked then. [servo]
+  [[nodiscard]] ConstraintSolution on_border(const Place& place, const Vec3& goal) const noexcept;
+  /// The same as `solve` with the friction of the plane that pushes most: each round leads the proxy to the probe as
+  /// far as the cone lets it go. `goal` becomes where a proxy without friction would have been led. [servo]
   template <class FrictionOf>
   ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
                                          const FrictionOf& friction_of) noexcept;

@@ -45,7 +45,9 @@ class PointProxy {
         const bool near = end == DescentEnd::left && (probe_ - spot_.point).dot(normal()) <= 2.0 * view_.skin();
         const bool between = end == DescentEnd::rest && !view_.within_face(place_);
         const bool limited = end == DescentEnd::limited && !work_.spent();
-        if (near || between || limited || end == DescentEnd::blocked) return {.simple = false};
+        if (between) return {.simple = false, .on_border = friction_.still <= 0.0};
+        const bool behind = end == DescentEnd::left && !view_.may_launch(place_, spot_);
+        if (near || behind || limited || end == DescentEnd::blocked) return {.simple = false};
       }
       // A walk has a limit of its own.
       if (end == DescentEnd::limited && !work_.spent() && !stays()) continue;

@@ -84,9 +84,10 @@ void answer_at_rest(const View& view, const PointProxy<View>& point, const Point
 }
 
 /// One surface touched by a point, or by a ball where the surface has one level further out for it. False, and nothing
-/// done, where more than one plane of a mesh may hold it.
+/// done, where more than one plane of a mesh may hold it; `border`: the place where
+/// those of an edge or a vertex do.
 template <SurfaceView View>
-bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
+bool constrain_on(const View& view, Touched& touch, Tick& tick, Place& border) noexcept {
   OfSurface& surface = touch.contact->surface;
   const Vec3& position = tick.probe->pose.position;
   const Vec3 from = touch.to_local(tick.state.proxy);
@@ -101,6 +102,7 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   if (!rest.simple) {
     surface.rests = rested;
     surface.sliding = slid;
+    if (rest.on_border) border = point.place();
     return false;
   }
   tick.converged = rest.converged;
@@ -118,8 +120,20 @@ bool constrain_on(const View& view, Touched& touch, Tick& tick) noexcept {
   return true;
 }
 
-/// Several surfaces, triangles, or a ball.
-void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
+/// Whether a point goes on by itself from what holds it: one plane of a mesh, or, where nothing rubs, those of faces
+/// that meet. A place on a border may be of a face that is seen from elsewhere there: only if it was `led` to it.
+bool goes_on_alone(const TriangleView& view, const OfSurface& surface, bool rubs, bool led) noexcept {
+  const auto& places = surface.places;
+  if (places.empty() || (places.size() > 1 && rubs)) return false;
+  return std::all_of(places.begin(), places.end(), [&](const Place& place) {
+    return (led || view.within_face(place)) && place.back == places[0].back &&
+           view.meet(place.element, places[0].element);
+  });
+}
+
+/// Several surfaces, triangles, or a ball. `border`: of a mesh, where a point was led to by
+/// itself.
+void constrain_jointly(Tick& tick, GeneratedPatches* patches, const Place& border) noexcept {
   ProxyState& state = tick.state;
   const Vec3& position = tick.probe->pose.position;
   JointSolve joint(tick.scene.probe_radius(), patches, tick.cache.work());
@@ -127,6 +141,7 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
   Vec3 from = before;
   bool rubs = false;
   bool smooth = false;
+  bool led = false;
   for (Touched& touch : tick.touches) {
     if (!touch.facts->constrains) continue;
     OfSurface& surface = touch.contact->surface;
@@ -152,7 +167,9 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     solution = joint.solve_with_friction(from, position, state.sliding, goal, friction_in);
   } else {
     state.sliding = false;
-    solution = joint.solve(from, goal);
+    if (border.known()) solution = joint.on_border(border, goal);
+    led = solution.settled();
+    if (!led) solution = joint.solve(from, goal);
   }
   state.proxy = joint.lifted(solution.proxy);
   tick.converged = solution.converged && joint.complete();
@@ -165,18 +182,17 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches) noexcept {
     Part& part = *tick.parts.emplace_back();
     part = {&touch, owner_force(touch, material, i, solution, goal, *tick.probe), material.stiffness};
     joint.remember_places(i, solution);
-    // One plane of one mesh: from there a point goes on by itself.
     OfSurface& surface = touch.contact->surface;
     surface.rests = joint.size() == 1 && !touch.facts->smooth && !touch.facts->by_planes &&
-                    tick.scene.probe_radius() == 0.0 && surface.places.size() == 1 &&
-                    TriangleView::within_face(surface.places[0]);
+                    tick.scene.probe_radius() == 0.0 && solution.settled() &&
+                    goes_on_alone(*std::get_if<TriangleView>(&touch.view), surface, rubs, led);
     surface.sliding = state.sliding;
   }
 }
 
 [[gnu::noinline]] void constrain_with_facets(Tick& tick) noexcept {
   GeneratedPatches patches;
-  constrain_jointly(tick, &patches);
+  constrain_jointly(tick, &patches, {});
 }
 
 /// Whether a proxy that is not at rest has anything left to do. `before`: where the tick found it.
@@ -216,14 +232,15 @@ void constrain(Tick& tick) noexcept {
       tick.scene.probe_radius() == 0.0 || (last->facts->volume && ball_level(*last->instance, tick.scene) > 0.0);
   // What several planes of a mesh held, they mostly hold on.
   const bool alone = count == 1 && point && !last->facts->by_planes &&
-                     (last->facts->smooth || last->contact->surface.places.size() <= 1);
+                     (last->facts->smooth || last->contact->surface.rests || last->contact->surface.places.size() <= 1);
   const Vec3 before = tick.state.proxy;
   if (alone) tick.state.sliding = last->contact->surface.sliding;
-  if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick); })) {
+  Place border;
+  if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick, border); })) {
     if (facets) {
       constrain_with_facets(tick);
     } else {
-      constrain_jointly(tick, nullptr);
+      constrain_jointly(tick, nullptr, border);
     }
   }
   see_what_is_left(tick, before);

@@ -26,6 +26,7 @@ struct FlatFrame {
   Vec3 along_u = Vec3::Zero();
   Vec3 along_v = Vec3::Zero();
   Vec3 front = Vec3::Zero();
+  Vec3 beside = Vec3::Zero();  ///< barycentric: what is less from an edge is beside it, some skins away
 
   [[nodiscard]] FlatSpot at(double u, double v) const noexcept {
     return {corner + u * along_u + v * along_v, along_u, along_v, front};

@@ -7,6 +7,9 @@ namespace asperity {
 
 namespace {
 
+// Nearer to an edge the faces across it may hold a point as well, and a skin off one may be behind another.
+constexpr double beside_in_skins = 8.0;
+
 FlatFrame frame_of(const MeshSurface& surface, std::uint32_t face) noexcept {
   const TriangleMesh& mesh = surface.mesh();
   const auto [a, b, c] = mesh.corners(face);
@@ -17,6 +20,9 @@ FlatFrame frame_of(const MeshSurface& surface, std::uint32_t face) noexcept {
   frame.along_u = b - a;
   frame.along_v = c - a;
   frame.front = mesh.face_normal(face);
+  const double area = frame.along_u.cross(frame.along_v).norm();
+  const double near = beside_in_skins * surface.skin() / area;
+  frame.beside = near * Vec3((c - b).norm(), frame.along_v.norm(), frame.along_u.norm());
   return frame;
 }
 
@@ -163,6 +169,63 @@ const FlatFrame& TriangleView::frame(std::uint32_t face) const noexcept {
   FlatFrame& last = cache_->flat.frame;
   if (last.face != face || last.owner != surface_->index().identity()) last = frame_of(*surface_, face);
   return last;
+}
+
+bool TriangleView::meet(std::uint32_t face, std::uint32_t other) const noexcept {
+  const auto triangles = surface_->mesh().triangles();
+  return share_vertex(triangles[face], triangles[other]);
+}
+
+void TriangleView::around(const Place& place, ContactSet& out) const noexcept {
+  const TriangleMesh& mesh = surface_->mesh();
+  const TriangleMesh::Triangle& own = mesh.triangles()[place.element];
+  const FlatFrame& here = frame(place.element);
+  for (int k = 0; k < 3; ++k) {
+    if (place.at[k] > on_border && place.at[k] <= here.beside[k]) return;
+  }
+  const Vec3 point = here.at(place.at[1], place.at[2]).point;
+  int nearest = 0;
+  place.at.maxCoeff(&nearest);
+  for (const std::uint32_t face : mesh.faces_of_vertex(own[static_cast<std::size_t>(nearest)])) {
+    const TriangleMesh::Triangle& theirs = mesh.triangles()[face];
+    Vec3 at = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto same = std::find(theirs.begin(), theirs.end(), own[k]);
+      if (same != theirs.end()) at[same - theirs.begin()] = place.at[static_cast<int>(k)];
+    }
+    // The others have but one end of the edge.
+    if (at.sum() < 1.0 - 2.0 * on_border) continue;
+    if (out.push_back({point, place.side() * mesh.face_normal(face), 0.0, face, at})) continue;
+    out.clear();
+    return;
+  }
+}
+
+void TriangleView::beside_border(const Place& place, ContactSet& out) const noexcept {
+  frame(place.element);
+  FlatFrame& here = cache_->flat.frame;
+  ask_whether_lonely(*surface_, here);
+  if (here.lonely) around(place, out);
+}
+
+bool TriangleView::may_launch(const Place& place, const FlatSpot& spot) const noexcept {
+  constexpr double least_above = 0.5;
+  if (within_face(place)) return true;
+  ContactSet feet;
+  around(place, feet);
+  const Vec3 off = place.side() * spot.front;
+  const auto behind = [&](const Foot& foot) {
+    if (foot.normal.dot(off) >= least_above) return false;
+    // Beyond a ridge it is not in the way.
+    const auto corners = surface_->mesh().corners(foot.element);
+    return std::any_of(corners.begin(), corners.end(),
+                       [&](const Vec3& corner) { return off.dot(corner - spot.point) > skin(); });
+  };
+  return !feet.empty() && std::none_of(feet.begin(), feet.end(), behind);
+}
+
+bool TriangleView::within_face(const Place& place) const noexcept {
+  return (place.at - frame(place.element).beside).minCoeff() > 0.0;
 }
 
 DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal) const noexcept {

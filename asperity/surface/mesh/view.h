@@ -48,7 +48,14 @@ class TriangleView {
     return true;
   }
   /// Whether one plane is all that holds a point there.
-  [[nodiscard]] static bool within_face(const Place& place) noexcept { return place.at.minCoeff() > on_border; }
+  [[nodiscard]] bool within_face(const Place& place) const noexcept;
+  /// Whether where `launch` begins is behind none of the faces around. [servo]
+  [[nodiscard]] bool may_launch(const Place& place, const FlatSpot& spot) const noexcept;
+  /// The planes of the faces around a place on an edge or a vertex, on the side of the place; none where anything else
+  /// may come near. [servo]
+  void beside_border(const Place& place, ContactSet& out) const noexcept;
+  /// Whether two faces have a vertex in common. [servo]
+  [[nodiscard]] bool meet(std::uint32_t face, std::uint32_t other) const noexcept;
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept { return surface_->eval(p, *cache_); }
   [[nodiscard]] double skin() const noexcept { return surface_->skin(); }
   [[nodiscard]] double grain() const noexcept { return surface_->mesh().mean_edge(); }
@@ -66,6 +73,9 @@ class TriangleView {
     const double edges = (motion.to - motion.from).norm() / grain();
     return {0, 0, 1 + static_cast<std::uint32_t>(std::min(edges, most))};
   }
+
+  /// The faces that a place on an edge or a vertex is on; none where they are too many, or more come near.
+  void around(const Place& place, ContactSet& out) const noexcept;
 
   const MeshSurface* surface_;
   SurfaceCache* cache_;
