@@ -165,10 +165,8 @@ SweptHit TriangleView::first_touch(const Segment& motion, Sides sides) const noe
   return hit;
 }
 
-const FlatFrame& TriangleView::frame(std::uint32_t face) const noexcept {
-  FlatFrame& last = cache_->flat.frame;
-  if (last.face != face || last.owner != surface_->index().identity()) last = frame_of(*surface_, face);
-  return last;
+void TriangleView::make_frame(std::uint32_t face) const noexcept {
+  cache_->flat.frame = frame_of(*surface_, face);
 }
 
 bool TriangleView::meet(std::uint32_t face, std::uint32_t other) const noexcept {
@@ -222,10 +220,6 @@ bool TriangleView::may_launch(const Place& place, const FlatSpot& spot) const no
                        [&](const Vec3& corner) { return off.dot(corner - spot.point) > skin(); });
   };
   return !feet.empty() && std::none_of(feet.begin(), feet.end(), behind);
-}
-
-bool TriangleView::within_face(const Place& place) const noexcept {
-  return (place.at - frame(place.element).beside).minCoeff() > 0.0;
 }
 
 DescentEnd TriangleView::descend(Place& place, FlatSpot& spot, const Goal& goal) const noexcept {

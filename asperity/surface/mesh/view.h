@@ -36,7 +36,11 @@ class TriangleView {
     return frame(place.element).at(place.at[1], place.at[2]);
   }
   /// The triangle of a place.
-  const FlatFrame& frame(std::uint32_t face) const noexcept;
+  const FlatFrame& frame(std::uint32_t face) const noexcept {
+    const FlatFrame& last = cache_->flat.frame;
+    if (last.face != face || last.owner != surface_->index().identity()) make_frame(face);
+    return last;
+  }
   /// Of the face, edge or vertex.
   [[nodiscard]] Vec3 front(const Foot& foot) const noexcept {
     return pseudonormal(surface_->mesh(), foot.element, foot.at).normalized();
@@ -48,7 +52,10 @@ class TriangleView {
     return true;
   }
   /// Whether one plane is all that holds a point there.
-  [[nodiscard]] bool within_face(const Place& place) const noexcept;
+  [[nodiscard]] bool within_face(const Place& place) const noexcept {
+    const Vec3& beside = frame(place.element).beside;
+    return place.at[0] > beside[0] && place.at[1] > beside[1] && place.at[2] > beside[2];
+  }
   /// Whether where `launch` begins is behind none of the faces around. [servo]
   [[nodiscard]] bool may_launch(const Place& place, const FlatSpot& spot) const noexcept;
   /// The planes of the faces around a place on an edge or a vertex, on the side of the place; none where anything else
@@ -74,6 +81,7 @@ class TriangleView {
     return {0, 0, 1 + static_cast<std::uint32_t>(std::min(edges, most))};
   }
 
+  void make_frame(std::uint32_t face) const noexcept;
   /// The faces that a place on an edge or a vertex is on; none where they are too many, or more come near.
   void around(const Place& place, ContactSet& out) const noexcept;
 
