@@ -76,7 +76,6 @@ Sizes sizes_for(const Options& options) {
     sizes.volumes = {64};
     sizes.potentials = {3};
     sizes.moved = {};
-    sizes.map_size = 256;
   }
   if (!asked(options, "mesh")) sizes.meshes.clear();
   if (!asked(options, "relief")) sizes.reliefs.clear();

@@ -104,6 +104,11 @@ class FaceChart {
     faces.squared_distances(place.frame, u, v, goal, squares);
   }
   { faces_.squared_distances(place_.frame, u, v, goal, squares); }
+  [[nodiscard]] double squared_distance(const Vec2& at, const Vec3& goal) const noexcept requires
+      requires(const Faces& faces, const Place& place) {
+    faces.squared_distance(place.frame, 0.0, 0.0, Vec3());
+  }
+  { return faces_.squared_distance(place_.frame, at.x(), at.y(), goal); }
   void look(double u, double v) const noexcept requires requires(const Faces& faces, const Place& place) {
     faces.look(place.frame, u, v);
   }

@@ -151,11 +151,9 @@ class Walk {
     // Mostly one; rounding up costs something.
     const int count = strides > 1.0 ? static_cast<int>(std::min(std::ceil(strides), 1.0 * asked_.moves)) : 1;
     bool any = false;
-    // On a short way the last place would be asked for twice as often as that saves.
-    constexpr int worth_it = 3;
     bool ahead = false;
     if constexpr (looks_ahead) {
-      ahead = count >= worth_it;
+      ahead = count > 1;
       if (ahead) any = advance_ahead(start, step, far, count, border, distance, attempt);
     }
     for (int i = 1; !ahead && i <= count; ++i) {
@@ -190,6 +188,15 @@ class Walk {
   int look_ahead(const Start& start, const WalkStep& step, double far, int count, double& distance) noexcept {
     int seen = 0;
     const double per = far / count;
+    if (count == 2) {
+      const Vec2 to = chart_.moved(start, step, per, -1);
+      ++moves_;
+      chart_.look(to.x(), to.y());
+      const double now = chart_.squared_distance(to, goal_);
+      if (!(now < distance)) return 0;
+      distance = now;
+      return 1;
+    }
     while (true) {
       Lanes u;
       Lanes v;

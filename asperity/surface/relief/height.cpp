@@ -11,11 +11,10 @@
 
 namespace asperity {
 
-bool ReliefSurface::in_band(const ReliefFrame& frame, double u, double v) const noexcept {
-  if (!frame.stitched) return false;
+bool ReliefSurface::within_bands(const StitchBand& band, double u, double v) noexcept {
   for (int k = 0; k < 3; ++k) {
     const double b = coordinate(k, u, v);
-    if (b < static_cast<double>(frame.band.look[k]) || b > 1.0 - static_cast<double>(frame.band.reach[k])) return true;
+    if (b < static_cast<double>(band.look[k]) || b > 1.0 - static_cast<double>(band.reach[k])) return true;
   }
   return false;
 }
@@ -33,7 +32,7 @@ void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, cons
                                   Lanes& heights) const noexcept {
   coat_.heights(frame.coat, u, v, heights);
   for (std::size_t i = 0; i < lanes; ++i) {
-    if (frame.stitched && in_band(frame, u[i], v[i])) {
+    if (in_band(frame, u[i], v[i])) {
       heights[i] = height_alone(frame, u[i], v[i]);
     } else if (frame.lowered) {
       heights[i] *= frame.share + u[i] * frame.share_u + v[i] * frame.share_v;
@@ -82,8 +81,8 @@ void ReliefSurface::squared_distances(const ReliefFrame& frame, const Lanes& u, 
   squares_of_four(frame.prism, u, v, heights, from, squares);
 }
 
-HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v) const noexcept {
-  if (!in_band(frame, u, v)) {
+HeightJet ReliefSurface::height(const ReliefFrame& frame, double u, double v, bool blended) const noexcept {
+  if (!blended) {
     HeightJet jet = coat_.jet(frame.coat, u, v);
     lower_by_share(frame, u, v, jet);
     return jet;

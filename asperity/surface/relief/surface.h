@@ -96,20 +96,28 @@ class ReliefSurface {
     return frame.owner == identity_ && frame.face == face && frame.coat.moment == moment;
   }
   /// Height as rendered over a place of the frame's triangle. [servo]
-  [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v) const noexcept {
+    return height(frame, u, v, in_band(frame, u, v));
+  }
   /// That height alone (m), to within rounding: where no neighbour has a say, in half the time. [servo]
   [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   /// The same at several places at once, equal to the bit. [servo]
   void heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept;
   /// Heights that are asked for there, about: the face's own, and in a band those of the faces around. [servo]
   [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
-    constexpr std::uint32_t in_a_band = 4;
-    return frame.stitched && in_band(frame, u, v) ? in_a_band : 1;
+    return in_band(frame, u, v) ? heights_in_band : 1;
   }
   /// The displaced surface over it. [servo]
   [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v) const noexcept {
+    std::uint32_t heights = 0;
+    return point(frame, u, v, heights);
+  }
+  /// The same; adds heights_at to `heights`. [servo]
+  [[nodiscard]] ReliefPoint point(const ReliefFrame& frame, double u, double v, std::uint32_t& heights) const noexcept {
+    const bool blended = in_band(frame, u, v);
+    heights += blended ? heights_in_band : 1;
     ReliefPoint spot;
-    spot.jet = height(frame, u, v);
+    spot.jet = height(frame, u, v, blended);
     const ShellPrism& prism = frame.prism;
     spot.direction = prism.direction_at(u, v);
     spot.point = prism.base_at(u, v) + spot.jet.height * spot.direction;
@@ -124,7 +132,10 @@ class ReliefSurface {
   [[nodiscard]] Vec3 place(const ReliefFrame& frame, double u, double v) const noexcept {
     return frame.prism.base_at(u, v) + height_alone(frame, u, v) * frame.prism.direction_at(u, v);
   }
-  /// Squared distances (m^2) of such points from another one, several at once. [servo]
+  /// Squared distance (m^2) of that point from another one; and several at once. [servo]
+  [[nodiscard]] double squared_distance(const ReliefFrame& frame, double u, double v, const Vec3& from) const noexcept {
+    return (place(frame, u, v) - from).squaredNorm();
+  }
   void squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& from,
                          Lanes& squares) const noexcept;
   /// Bounds of the height as rendered, over the triangle with these corners. [servo]
@@ -177,6 +188,7 @@ class ReliefSurface {
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
+  static constexpr std::uint32_t heights_in_band = 4;
   struct CarriedHeights;
   struct Enclosed;
   class EnclosedByFour;
@@ -213,7 +225,12 @@ class ReliefSurface {
                                     std::uint32_t other, Vec3& gradient) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
-  [[nodiscard]] bool in_band(const ReliefFrame& frame, double u, double v) const noexcept;
+  [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v, bool blended) const noexcept;
+  /// Whether other faces have a say at a place.
+  [[nodiscard]] static bool in_band(const ReliefFrame& frame, double u, double v) noexcept {
+    return frame.stitched && within_bands(frame.band, u, v);
+  }
+  [[nodiscard]] static bool within_bands(const StitchBand& band, double u, double v) noexcept;
   [[nodiscard]] bool reaches_band(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightForm stitched_form(const ReliefFrame& frame, const FacePart& part) const noexcept;
   [[nodiscard]] HeightRange range_around(const ReliefFrame& frame, const FacePart& part) const noexcept;

@@ -38,12 +38,14 @@ struct ReliefFaces {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface.base().mesh(); }
   [[nodiscard]] ReliefFrame frame(std::uint32_t face) const noexcept { return surface.frame(face, moment); }
   [[nodiscard]] ReliefPoint evaluate(const ReliefFrame& frame, double u, double v) const noexcept {
-    count.evaluations += surface.heights_at(frame, u, v);
-    return surface.point(frame, u, v);
+    return surface.point(frame, u, v, count.evaluations);
   }
   void squared_distances(const ReliefFrame& frame, const Lanes& u, const Lanes& v, const Vec3& goal,
                          Lanes& squares) const noexcept {
     surface.squared_distances(frame, u, v, goal, squares);
+  }
+  [[nodiscard]] double squared_distance(const ReliefFrame& frame, double u, double v, const Vec3& goal) const noexcept {
+    return surface.squared_distance(frame, u, v, goal);
   }
   void look(const ReliefFrame& frame, double u, double v) const noexcept {
     count.evaluations += surface.heights_at(frame, u, v);
