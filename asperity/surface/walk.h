@@ -190,10 +190,10 @@ class Walk {
     const double per = far / count;
     if (count == 2) {
       const Vec2 to = chart_.moved(start, step, per, -1);
-      ++moves_;
       chart_.look(to.x(), to.y());
       const double now = chart_.squared_distance(to, goal_);
       if (!(now < distance)) return 0;
+      ++moves_;
       distance = now;
       return 1;
     }
@@ -226,9 +226,11 @@ class Walk {
                                        double& distance, const Attempt& attempt) noexcept {
     const int seen = look_ahead(start, step, far, count, distance);
     if (seen == count - 1 && attempt(far, border)) return true;
-    if (seen == 0) return false;
+    // Of a short step that fails at once the flank is wanted.
+    if (seen == 0) return count == 2 && attempt(far / count, -1);
     const auto to = chart_.moved(start, step, far / count * seen, -1);
-    ++moves_;
+    // The middle of two was counted as it was looked at.
+    if (count > 2) ++moves_;
     Spot there;
     chart_.evaluate(to, there);
     chart_.take(to, there);
