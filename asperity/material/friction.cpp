@@ -34,18 +34,15 @@ Vec3 coulomb(const FrictionLaw& law, const TangentContact& c) noexcept {
 // Kikuuwe et al. 2006: the spring's stretch after the tick solves K z + B (z - z0) / dt = -f with f on the ellipse;
 // the nearest point of the ellipse is that solution in closed form.
 Vec3 implicit_coulomb(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
-  const double damping = law.damping / c.dt;
+  const double damping = law.damping > 0.0 ? law.damping / c.dt : 0.0;
   const Vec3 stretched = state.stretch + c.motion;
   const Vec3 pull = c.stiffness * stretched + damping * c.motion;
-  if (c.within(pull, state.sliding ? c.sliding : c.still)) {
-    state.sliding = false;
-    state.stretch = stretched;
-    return -pull;
-  }
-  const Vec3 held = c.nearest(pull, c.sliding);
-  state.sliding = true;
-  state.stretch = (held + damping * state.stretch) / (c.stiffness + damping);
-  return -held;
+  const bool sticks = !state.sliding && c.within(pull, c.still);
+  const Limited held = sticks ? Limited{pull} : c.limited(pull, c.sliding);
+  state.sliding = !(sticks || (state.sliding && held.inside));
+  state.stretch =
+      state.sliding ? Vec3((1.0 / (c.stiffness + damping)) * (held.value + damping * state.stretch)) : stretched;
+  return -held.value;
 }
 
 Vec3 karnopp_literal(const FrictionLaw& law, const TangentContact& c, FrictionState& state) noexcept {
@@ -108,11 +105,14 @@ Vec3 karnopp(const FrictionLaw& law, const TangentContact& c, FrictionState& sta
 
 /// Half-axes of the stretch (m) at which the spring is at `limits`.
 Limits stretch_limits(const Limits& limits, double stiffness) noexcept {
-  return {limits.across / stiffness, limits.lay / stiffness};
+  const double softness = 1.0 / stiffness;
+  return {limits.across * softness, limits.lay * softness};
 }
 
 /// How fast the stretch forgets along the motion: |A d|, A the stretch's half-axes (m²).
 double forgetting(const TangentContact& c, const Limits& axes) noexcept {
+  // The root of the motion alone does not wait for the axes.
+  if (c.round) return axes.across * c.motion.norm();
   return c.scaled(c.motion, axes.across, axes.lay).norm();
 }
 
@@ -124,13 +124,14 @@ struct Decay {
 Decay decay(double amount, double axis) noexcept {
   if (amount <= 0.0) return {};
   if (axis <= 0.0) return {0.0, 0.0};
-  const double h = amount / (axis * axis);
+  const double square = axis * axis;
+  const double h = amount / square;
   if (h < 1e-4) {
     const double share = 1.0 - 0.5 * h * (1.0 - h / 3.0);
     return {1.0 - h * share, share};
   }
   const double kept = std::exp(-h);
-  return {kept, (1.0 - kept) / h};
+  return {kept, (1.0 - kept) * (square / amount)};
 }
 
 /// Exact solution of dz = dx - h |A dx| A^-2 z over a straight motion, kept within the ellipse of `held`. In every
@@ -152,9 +153,11 @@ void keep_stretch(const TangentContact& c, const Vec3& stretch, FrictionState& s
   state.stretch = stretch;
 }
 
-/// Weight of the rate at the start of a step: half for short steps, none for long ones.
-double start_weight(double length) noexcept {
-  return 0.5 / (1.0 + length * length);
+/// Weight of the rate at the start of a step: half for short steps, none for long ones. `square` over `forgotten` is
+/// the step's length.
+double start_weight(double square, double forgotten) noexcept {
+  const double forgotten_square = forgotten * forgotten;
+  return forgotten_square > 0.0 ? 0.5 * forgotten_square / (forgotten_square + square * square) : 0.5;
 }
 
 // Dahl 1968: dF/dx = K (1 - F/F_c sgn)^i. Written as a relaxation at the rate h(r) = (1 - (1 - r)^i) / r, r the share
@@ -165,7 +168,8 @@ Vec3 dahl(const FrictionLaw& law, const TangentContact& c, FrictionState& state)
   double rate = 1.0;
   if (std::abs(law.exponent - 1.0) > 1e-6 && forgotten > 0.0) {
     const double power = law.exponent;
-    const double length = c.motion.squaredNorm() / forgotten;
+    const double square = c.motion.squaredNorm();
+    const double length = square / forgotten;
     // `rest` is 1 - r; the one-dimensional law, d(rest) = -rest^i d(length), is solved exactly for its end.
     const double before = 1.0 - std::clamp(state.stretch.dot(c.motion) / forgotten, -1.0, 1.0);
     double rate_before = 1.0;
@@ -181,7 +185,7 @@ Vec3 dahl(const FrictionLaw& law, const TangentContact& c, FrictionState& state)
       rate_before = rate_at(before, before / root_before);
       if (after > 0.0) rate_after = rate_at(after, after / root_after);
     }
-    const double weight = start_weight(length);
+    const double weight = start_weight(square, forgotten);
     rate = weight * rate_before + (1.0 - weight) * rate_after;
   }
   keep_stretch(c, relaxed(c, state.stretch, rate, forgotten, axes, axes), state);
@@ -217,7 +221,7 @@ Vec3 hayward_armstrong(const FrictionLaw& law, const TangentContact& c, Friction
     // Where the stretch will be once the anchor has come along for its share of the way.
     const double moved = reached - before;
     const double last = creep(before + moved - first * before * std::abs(moved), law.adhesion);
-    const double weight = forgotten > 0.0 ? start_weight(c.motion.squaredNorm() / forgotten) : 0.5;
+    const double weight = start_weight(c.motion.squaredNorm(), forgotten);
     const double rate = weight * first + (1.0 - weight) * last;
     stretch = relaxed(c, state.stretch, rate, forgotten, axes, axes);
   }

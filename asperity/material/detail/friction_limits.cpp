@@ -28,8 +28,10 @@ Vec2 nearest_on_ellipse(double x, double y, double a, double b) noexcept {
   double v = 0.0;
   double excess = 0.0;
   for (int step = 0; step < most_steps; ++step) {
-    const double by_a = 1.0 / (t + 1.0);
-    const double by_b = 1.0 / (t + square);
+    // One division for both.
+    const double by_both = 1.0 / ((t + 1.0) * (t + square));
+    const double by_a = by_both * (t + square);
+    const double by_b = by_both * (t + 1.0);
     u = p * by_a;
     v = bq * by_b;
     excess = u * u + v * v - 1.0;
@@ -55,12 +57,16 @@ bool within_ellipse(double x, double y, const Limits& limits) noexcept {
   return std::abs(x) <= limits.across && std::abs(y) <= limits.lay && p * p + q * q <= r * r;
 }
 
-Vec2 nearest_in_disc(double x, double y, const Limits& limits) noexcept {
-  if (within_ellipse(x, y, limits)) return {x, y};
+/// Of a place outside.
+Vec2 nearest_on_rim(double x, double y, const Limits& limits) noexcept {
   if (limits.across >= limits.lay)
     return limits.across > 0.0 ? nearest_on_ellipse(x, y, limits.across, limits.lay) : Vec2(0.0, 0.0);
   const Vec2 turned = nearest_on_ellipse(y, x, limits.lay, limits.across);
   return {turned.y(), turned.x()};
+}
+
+Vec2 nearest_in_disc(double x, double y, const Limits& limits) noexcept {
+  return within_ellipse(x, y, limits) ? Vec2(x, y) : nearest_on_rim(x, y, limits);
 }
 
 /// Share of the way from the coefficient across the lay to the one along it (heterogeneous-features-2008, eq. 15).
@@ -74,18 +80,22 @@ bool TangentContact::within_sides(const Vec3& pull, const Limits& limits) const 
   return within_ellipse(pull.dot(across), pull.dot(lay), limits);
 }
 
-Vec3 TangentContact::nearest_by_sides(const Vec3& pull, const Limits& limits) const noexcept {
-  const Vec2 point = nearest_in_disc(pull.dot(across), pull.dot(lay), limits);
-  return point.x() * across + point.y() * lay;
+Limited TangentContact::limited_by_sides(const Vec3& pull, const Limits& limits) const noexcept {
+  const Vec2 sides(pull.dot(across), pull.dot(lay));
+  if (within_ellipse(sides.x(), sides.y(), limits)) return {pull, true};
+  const Vec2 point = nearest_on_rim(sides.x(), sides.y(), limits);
+  return {point.x() * across + point.y() * lay, false};
 }
 
 void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, const Vec3& stretch) noexcept {
   const Vec3& normal = contact.normal;
   const FrictionCoefficients& coefficients = contact.coefficients;
   Vec3 across = coefficients.across - normal.dot(coefficients.across) * normal;
-  const double length = across.norm();
-  if (!(length > no_lay)) return;
-  across /= length;
+  const double length = across.squaredNorm();
+  if (!(length > no_lay * no_lay)) return;
+  // Mostly it comes as a unit vector.
+  constexpr double rounding = 1e-14;
+  if (std::abs(length - 1.0) > rounding) across *= 1.0 / std::sqrt(length);
   const Vec3 lay = normal.cross(across);
   const double still = tangent.still.across;
   const double sliding = tangent.sliding.across;
@@ -117,7 +127,7 @@ void set_anisotropy(TangentContact& tangent, const FrictionContact& contact, con
 Vec3 nearest_in_ellipse(const Vec3& pull, const Vec3& normal, const Vec3& across, double along_across,
                         double along_lay) noexcept {
   const Vec3 flat = pull - normal.dot(pull) * normal;
-  if (across.isZero(0.0)) return nearest_in_circle(flat, along_across);
+  if (across.isZero(0.0)) return limited_by_circle(flat, along_across).value;
   const Vec3 lay = normal.cross(across);
   const Vec2 point = nearest_in_disc(flat.dot(across), flat.dot(lay), {along_across, along_lay});
   return point.x() * across + point.y() * lay;

@@ -18,11 +18,17 @@ struct Limits {
 /// Length of a direction across the lay within the tangent plane below which there is no lay to speak of.
 inline constexpr double no_lay = 1e-6;
 
+/// A force or a stretch after a limit was set to it.
+struct Limited {
+  Vec3 value;
+  bool inside = true;  ///< it was within the limit, and is as it was
+};
+
 /// The point of the disc of `radius` that is nearest to `pull`. [servo]
-inline Vec3 nearest_in_circle(const Vec3& pull, double radius) noexcept {
+inline Limited limited_by_circle(const Vec3& pull, double radius) noexcept {
   const double square = pull.squaredNorm();
-  if (square <= radius * radius) return pull;
-  return (radius / std::sqrt(square)) * pull;
+  if (square <= radius * radius) return {pull, true};
+  return {(radius / std::sqrt(square)) * pull, false};
 }
 
 /// One tick of a contact, reduced to its tangent plane. A spring of two stiffnesses K and r² K (along the lay) is one
@@ -58,9 +64,11 @@ struct TangentContact {
     return within_sides(pull, limits);
   }
   /// The point of the ellipse's disc that is nearest to `pull`. [servo]
+  [[nodiscard]] Limited limited(const Vec3& pull, const Limits& limits) const noexcept {
+    return round ? limited_by_circle(pull, limits.across) : limited_by_sides(pull, limits);
+  }
   [[nodiscard]] Vec3 nearest(const Vec3& pull, const Limits& limits) const noexcept {
-    if (round) return nearest_in_circle(pull, limits.across);
-    return nearest_by_sides(pull, limits);
+    return limited(pull, limits).value;
   }
   /// The point of the ellipse that lies farthest against `direction`: Coulomb friction of maximum dissipation.
   /// Zero where `direction` is, or is not resisted. [servo]
@@ -73,7 +81,7 @@ struct TangentContact {
 
  private:
   [[nodiscard]] bool within_sides(const Vec3& pull, const Limits& limits) const noexcept;
-  [[nodiscard]] Vec3 nearest_by_sides(const Vec3& pull, const Limits& limits) const noexcept;
+  [[nodiscard]] Limited limited_by_sides(const Vec3& pull, const Limits& limits) const noexcept;
 };
 
 /// Sets the axes and what limits and stiffness are along them, or by the direction (literal), from those across the

@@ -55,8 +55,8 @@ struct TextureSample {
 
 /// How much of a feature is felt at a place whose coordinates have these gradients along the surface, at a `velocity`
 /// along it.
-double felt_share(const SurfaceFeature& feature, double steepness, const MappedPlace& place, const Vec3& du,
-                  const Vec3& dv, const Vec3& velocity, Seconds dt, double resolution) noexcept {
+double felt_share(const SurfaceFeature& feature, double steepness, const MappedPlace& place, const Vec3& normal,
+                  const FineMotion& motion, double resolution) noexcept {
   constexpr double whole_from = 4.0;  // steps a wavelength, as texture_share has it
   const double wavelength = feature.wavelength();
   const Vec2 across = feature.across(place.uv);
@@ -64,37 +64,36 @@ double felt_share(const SurfaceFeature& feature, double steepness, const MappedP
   double density = 0.0;
   double passed = 0.0;
   if (!across.isZero()) {
-    const Vec3 wave = across.x() * du + across.y() * dv;
+    const Vec3 wave = surface_gradient(across.x() * place.du + across.y() * place.dv, normal);
     density = wave.squaredNorm();
-    passed = std::abs(velocity.dot(wave));
+    passed = std::abs(motion.velocity.dot(wave));
   } else {
+    const Vec3 du = surface_gradient(place.du, normal);
+    const Vec3 dv = surface_gradient(place.dv, normal);
     density = std::max(du.squaredNorm(), dv.squaredNorm());
-    passed = std::sqrt(density * velocity.squaredNorm());
+    passed = std::sqrt(density * surface_gradient(motion.velocity, normal).squaredNorm());
   }
   const double finest = whole_from * resolution;
   const bool renderable =
-      wavelength >= whole_from * passed * dt.count() && wavelength * wavelength >= finest * finest * density;
+      wavelength >= whole_from * passed * motion.dt.count() && wavelength * wavelength >= finest * finest * density;
   constexpr double most_slope = FineFeatures::most_slope;
   const bool crowded = steepness * steepness * density > most_slope * most_slope;
   if (renderable && !crowded) return 1.0;
   const double root = std::sqrt(density);
-  const double share = texture_share(wavelength / root, passed / root, dt, resolution);
+  const double share = texture_share(wavelength / root, passed / root, motion.dt, resolution);
   return crowded ? share * most_slope / (steepness * root) : share;
 }
 
 TextureSample sample_features(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal,
                               const FineMotion& motion, double resolution) noexcept {
   TextureSample out;
-  const Vec3 along = surface_gradient(motion.velocity, normal);
   for (const MappedPlace& place : places) {
     double height = 0.0;
     Vec2 gradient = Vec2::Zero();
-    const Vec3 du = surface_gradient(place.du, normal);
-    const Vec3 dv = surface_gradient(place.dv, normal);
     const std::vector<SurfaceFeature>& features = fine.settings().texture;
     for (std::size_t i = 0; i < features.size(); ++i) {
       const SurfaceFeature& feature = features[i];
-      const double share = felt_share(feature, fine.steepness(i), place, du, dv, along, motion.dt, resolution);
+      const double share = felt_share(feature, fine.steepness(i), place, normal, motion, resolution);
       out.faded = out.faded || share < 1.0;
       if (share == 0.0) continue;
       const FeatureSample here = feature.sample(place.uv);
@@ -182,6 +181,37 @@ const ReliefSurface* lay_of(const Instance& instance) noexcept {
   return maps != nullptr && maps->has_lay() ? relief : nullptr;
 }
 
+/// Coefficients by direction of the features' lay at a place and by what interlocks there; answers the direction (u, v)
+/// across which they are largest, zero where all are alike.
+Vec2 shape_by_lay(const FineFeatures& fine, const Vec2& uv, FrictionCoefficients& coefficients) noexcept {
+  const FrictionLay& ratios = fine.settings().lay;
+  const Vec2 lay = fine.across(uv);
+  coefficients.stiffness_ratio = ratios.stiffness_ratio;
+  if (!fine.interlocks()) {
+    const bool shaped = ratios.still_ratio < 1.0 || ratios.sliding_ratio < 1.0 || ratios.stiffness_ratio < 1.0;
+    if (!shaped || lay.isZero()) return Vec2::Zero();
+    coefficients.still_ratio = ratios.still_ratio;
+    coefficients.sliding_ratio = ratios.sliding_ratio;
+    return lay;
+  }
+  const LayMatrix added = fine.interlock(uv);
+  const double still = coefficients.still;
+  const double sliding = coefficients.sliding;
+  const LayMatrix holds = LayMatrix::of(still, still * ratios.still_ratio, lay) + added;
+  const LayMatrix slides = LayMatrix::of(sliding, sliding * ratios.sliding_ratio, lay) + added;
+  Vec2 axis = slides.principal();
+  if (axis.isZero()) axis = holds.principal();
+  if (axis.isZero() && ratios.stiffness_ratio < 1.0) axis = lay;
+  const Vec2 across = axis.isZero() ? Vec2(Vec2::UnitX()) : axis;
+  const Vec2 aside(-across.y(), across.x());
+  const auto ratio = [](double along, double most) { return most > 0.0 ? std::min(1.0, along / most) : 1.0; };
+  coefficients.still = holds.along(across);
+  coefficients.sliding = slides.along(across);
+  coefficients.still_ratio = ratio(holds.along(aside), coefficients.still);
+  coefficients.sliding_ratio = ratio(slides.along(aside), coefficients.sliding);
+  return axis;
+}
+
 /// Coefficients of a place, and across which direction they are largest.
 void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const Vec3& normal, Vec3& last_across,
                     FrictionCoefficients& coefficients) noexcept {
@@ -195,31 +225,22 @@ void shape_friction(const FineFeatures& fine, const MappedPlaces& places, const 
     }
   }
   const MappedPlace& place = places[0];
-  const Vec2 lay = fine.across(place.uv);
-  const LayMatrix added = fine.interlocks() ? fine.interlock(place.uv) : LayMatrix{};
-  const double still = factor * coefficients.still;
-  const double sliding = factor * coefficients.sliding;
-  const LayMatrix holds = LayMatrix::of(still, still * settings.lay.still_ratio, lay) + added;
-  const LayMatrix slides = LayMatrix::of(sliding, sliding * settings.lay.sliding_ratio, lay) + added;
-  Vec2 axis = slides.principal();
-  if (axis.isZero()) axis = holds.principal();
-  if (axis.isZero() && settings.lay.stiffness_ratio < 1.0) axis = lay;
+  coefficients.still *= factor;
+  coefficients.sliding *= factor;
+  const Vec2 axis = shape_by_lay(fine, place.uv, coefficients);
   // Where the lay is lost (the centre of circles, a cylinder's axis) it goes on as it was.
-  const Vec3 way = surface_gradient(axis.x() * place.du + axis.y() * place.dv, normal);
-  const double length = way.norm();
-  if (length > 0.0) last_across = way / length;
-  const Vec3 kept = surface_gradient(last_across, normal);
-  const double rest = kept.norm();
-  if (axis.isZero()) axis = Vec2::UnitX();
-  const Vec2 aside(-axis.y(), axis.x());
-  coefficients.still = holds.along(axis);
-  coefficients.sliding = slides.along(axis);
-  if (rest > 0.0) {
-    const auto ratio = [](double along, double across) { return across > 0.0 ? std::min(1.0, along / across) : 1.0; };
-    coefficients.across = kept / rest;
-    coefficients.still_ratio = ratio(holds.along(aside), coefficients.still);
-    coefficients.sliding_ratio = ratio(slides.along(aside), coefficients.sliding);
-    coefficients.stiffness_ratio = settings.lay.stiffness_ratio;
+  Vec3 way = surface_gradient(axis.x() * place.du + axis.y() * place.dv, normal);
+  double square = way.squaredNorm();
+  const bool lost = !(square > 0.0);
+  if (lost) {
+    way = surface_gradient(last_across, normal);
+    square = way.squaredNorm();
+  }
+  if (square > 0.0) {
+    coefficients.across = (1.0 / std::sqrt(square)) * way;
+    if (!lost) last_across = coefficients.across;
+  } else {
+    coefficients.still_ratio = coefficients.sliding_ratio = coefficients.stiffness_ratio = 1.0;
   }
   coefficients.formulation = settings.lay.formulation;
 }
