@@ -52,11 +52,15 @@ if(ASPERITY_SANITIZE)
 endif()
 
 # asperity_inlined(TARGET): nothing of Eigen's small vectors is left as a call. GCC leaves some, which cost a tick more
-# than what they do. (Not for `field`, whose wide kernels then round their sums otherwise from one to the other.)
-set(ASPERITY_INLINED_MODULES geometry surface render)
+# than what they do. And two components of such a vector are not joined in pairs: what was written one by one and is read
+# as a pair makes the processor wait. (Not for `field`, whose wide kernels then round their sums otherwise from one to
+# the other, and whose polynomials gain from pairs.)
+set(ASPERITY_INLINED_MODULES geometry material surface render)
 function(asperity_inlined target)
   target_compile_definitions(${target} PRIVATE
     "$<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:EIGEN_STRONG_INLINE=inline __attribute__((always_inline))>")
+  target_compile_options(${target} PRIVATE
+    $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-fno-tree-slp-vectorize>)
 endfunction()
 
 # asperity_module(NAME UNITS n [SOURCES files...] [FOLDERS folders...] DEPENDS modules... LIBRARIES public... PRIVATE private...)
