@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
+
+#include "asperity/core/parallel_for.h"
 
 namespace asperity {
 
@@ -9,6 +13,8 @@ namespace {
 
 constexpr std::uint32_t leaf_size = 8;
 constexpr int bin_count = 16;
+// Up to so many triangles every cut that fills leaves is looked at.
+constexpr std::uint32_t counted_one_by_one = 64;
 // Below this depth ranges are halved by position whatever the area: it bounds the traversal stack.
 constexpr int balanced_depth = 20;
 // From so far away (in sizes of the mesh) single precision tells no two triangles apart, and its squares leave their
@@ -35,21 +41,77 @@ class Bvh::Builder {
 
   void run() {
     const auto count = static_cast<std::uint32_t>(mesh_.triangles().size());
-    primitives_.resize(count);
-    Range all{0, count, {}};
-    for (std::uint32_t face = 0; face < count; ++face) {
-      primitives_[face] = primitive(face);
-      all.box.include(primitives_[face]);
+    Range all{0, count, take_primitives(count)};
+    bvh_.leaves_.reserve(count / 7 + 1);
+    bvh_.nodes_.reserve(count / 40 + 1);
+    // The top by one thread, what is below it by all; how it is shared out does not depend on how many they are.
+    constexpr std::uint32_t parts = 32;
+    constexpr std::uint32_t least_part = 4096;
+    Top top{std::max(count / parts, least_part), {}};
+    Part whole{std::move(bvh_.nodes_), std::move(bvh_.leaves_)};
+    build_node(whole, all, 0, &top);
+    std::vector<Part> built(top.parts.size());
+    parallel_for(built.size(), {},
+                 [&](std::size_t i) { build_node(built[i], top.parts[i].range, top.parts[i].depth, nullptr); });
+    for (std::size_t i = 0; i < built.size(); ++i) {
+      whole.nodes[top.parts[i].parent].child[top.parts[i].place] = append(whole, built[i]);
+      built[i] = {};
     }
-    bvh_.leaves_.reserve(count / 5 + 1);
-    bvh_.nodes_.reserve(count / 24 + 1);
-    build_node(all, 0);
+    bvh_.nodes_ = std::move(whole.nodes);
+    bvh_.leaves_ = std::move(whole.leaves);
     bvh_.nodes_.shrink_to_fit();
     bvh_.leaves_.shrink_to_fit();
     bvh_.cylinders_.resize(bvh_.leaves_.size());
   }
 
  private:
+  struct Part {
+    std::vector<Node> nodes;
+    std::vector<Leaf> leaves;
+  };
+  /// Ranges that are left for later, and where their nodes belong.
+  struct Top {
+    std::uint32_t most;  ///< triangles of such a range
+    struct Left {
+      Range range;
+      int depth;
+      std::uint32_t parent;
+      int place;
+    };
+    std::vector<Left> parts;
+  };
+
+  /// Answers the box of all.
+  FloatBox take_primitives(std::uint32_t count) {
+    primitives_.resize(count);
+    constexpr std::uint32_t share = 16384;
+    std::vector<FloatBox> boxes((count + share - 1) / share);
+    parallel_for(boxes.size(), {}, [&](std::size_t i) {
+      const auto first = static_cast<std::uint32_t>(i) * share;
+      for (std::uint32_t face = first; face < std::min(first + share, count); ++face) {
+        primitives_[face] = primitive(face);
+        boxes[i].include(primitives_[face]);
+      }
+    });
+    FloatBox all;
+    for (const FloatBox& box : boxes) all.include(box);
+    return all;
+  }
+
+  /// Answers the index that the part's first node has in the whole.
+  static std::uint32_t append(Part& whole, const Part& part) {
+    const auto first_node = static_cast<std::uint32_t>(whole.nodes.size());
+    const auto first_leaf = static_cast<std::uint32_t>(whole.leaves.size());
+    whole.leaves.insert(whole.leaves.end(), part.leaves.begin(), part.leaves.end());
+    for (Node node : part.nodes) {
+      for (std::uint32_t& child : node.child) {
+        if (child != empty_child) child += (child & leaf_bit) != 0 ? first_leaf : first_node;
+      }
+      whole.nodes.push_back(node);
+    }
+    return first_node;
+  }
+
   [[nodiscard]] Primitive primitive(std::uint32_t face) const {
     Primitive p{{}, face};
     for (const Vec3& corner : mesh_.corners(face)) {
@@ -60,7 +122,8 @@ class Bvh::Builder {
     return p;
   }
 
-  std::uint32_t build_node(const Range& range, int depth) {
+  /// With a `top`, ranges of its size are left to it.
+  std::uint32_t build_node(Part& part, const Range& range, int depth, Top* top) {
     Range children[8];
     int count = 1;
     children[0] = range;
@@ -74,22 +137,27 @@ class Bvh::Builder {
       split(children[widest], depth, children[widest], children[count]);
       ++count;
     }
-    const auto index = static_cast<std::uint32_t>(bvh_.nodes_.size());
-    bvh_.nodes_.emplace_back();
-    for (std::uint32_t& child : bvh_.nodes_[index].child) child = empty_child;
+    const auto index = static_cast<std::uint32_t>(part.nodes.size());
+    part.nodes.emplace_back();
+    for (std::uint32_t& child : part.nodes[index].child) child = empty_child;
     for (int i = 0; i < count; ++i) {
+      const std::uint32_t size = children[i].size();
+      if (top != nullptr && size > leaf_size && size <= top->most) {
+        top->parts.push_back({children[i], depth + 1, index, i});
+        continue;
+      }
       const std::uint32_t child =
-          children[i].size() <= leaf_size ? build_leaf(children[i]) : build_node(children[i], depth + 1);
-      bvh_.nodes_[index].child[i] = child;
+          size <= leaf_size ? build_leaf(part, children[i]) : build_node(part, children[i], depth + 1, top);
+      part.nodes[index].child[i] = child;
     }
     return index;
   }
 
-  std::uint32_t build_leaf(const Range& range) {
-    Leaf& leaf = bvh_.leaves_.emplace_back();
+  std::uint32_t build_leaf(Part& part, const Range& range) {
+    Leaf& leaf = part.leaves.emplace_back();
     for (std::uint32_t i = 0; i < 8; ++i)
       leaf.face[i] = i < range.size() ? primitives_[range.first + i].face : no_index;
-    return static_cast<std::uint32_t>(bvh_.leaves_.size() - 1) | leaf_bit;
+    return static_cast<std::uint32_t>(part.leaves.size() - 1) | leaf_bit;
   }
 
   /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
@@ -106,11 +174,16 @@ class Bvh::Builder {
     }
     std::uint32_t middle = range.first;
     if (depth < balanced_depth && high[axis] - low[axis] > 1e-12F) {
-      middle = partition_by_area(range, axis, low[axis], high[axis]);
+      middle = range.size() <= counted_one_by_one ? cut_by_leaves(range, axis)
+                                                  : partition_by_area(range, axis, low[axis], high[axis]);
     }
     if (middle == range.first || middle == range.last) middle = halve(range, axis);
     left = bounded(range.first, middle);
     right = bounded(middle, range.last);
+  }
+
+  [[nodiscard]] static float leaves_for(std::uint32_t triangles) {
+    return static_cast<float>((triangles + leaf_size - 1) / leaf_size);
   }
 
   std::uint32_t partition_by_area(const Range& range, int axis, float low, float high) {
@@ -129,7 +202,7 @@ class Bvh::Builder {
     for (int bin = bin_count - 1; bin > 0; --bin) {
       sweep.include(boxes[bin]);
       sum += counts[bin];
-      right_cost[bin] = sweep.area() * static_cast<float>(sum);
+      right_cost[bin] = sweep.area() * leaves_for(sum);
     }
     sweep = {};
     sum = 0;
@@ -138,7 +211,7 @@ class Bvh::Builder {
     for (int bin = 0; bin + 1 < bin_count; ++bin) {
       sweep.include(boxes[bin]);
       sum += counts[bin];
-      const float cost = sweep.area() * static_cast<float>(sum) + right_cost[bin + 1];
+      const float cost = sweep.area() * leaves_for(sum) + right_cost[bin + 1];
       if (sum != 0 && sum != range.size() && cost < best_cost) {
         best_cost = cost;
         best = bin;
@@ -149,6 +222,37 @@ class Bvh::Builder {
     const auto last = primitives_.begin() + range.last;
     const auto middle = std::partition(first, last, [&](const Primitive& p) { return bin_of(p) <= best; });
     return static_cast<std::uint32_t>(middle - primitives_.begin());
+  }
+
+  /// Cuts a small range where both sides fill leaves: what a query looks at are leaves, full or not.
+  std::uint32_t cut_by_leaves(const Range& range, int axis) {
+    const auto begin = primitives_.begin() + range.first;
+    std::sort(begin, primitives_.begin() + range.last, [axis](const Primitive& a, const Primitive& b) {
+      const float at_a = a.centre(axis);
+      const float at_b = b.centre(axis);
+      return at_a < at_b || (at_a == at_b && a.face < b.face);
+    });
+    constexpr std::uint32_t most_cuts = counted_one_by_one / leaf_size;
+    float right_cost[most_cuts + 1] = {};
+    FloatBox sweep;
+    for (std::uint32_t i = range.size(); i-- > leaf_size;) {
+      sweep.include(begin[i]);
+      if (i % leaf_size == 0) right_cost[i / leaf_size] = sweep.area() * leaves_for(range.size() - i);
+    }
+    sweep = {};
+    std::uint32_t best = 0;
+    float best_cost = 1e30F;
+    for (std::uint32_t i = 0; i + 1 < range.size(); ++i) {
+      sweep.include(begin[i]);
+      if ((i + 1) % leaf_size != 0) continue;
+      const std::uint32_t cut = (i + 1) / leaf_size;
+      const float cost = sweep.area() * static_cast<float>(cut) + right_cost[cut];
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = i + 1;
+      }
+    }
+    return range.first + best;
   }
 
   std::uint32_t halve(const Range& range, int axis) {

@@ -464,8 +464,8 @@ void SparseGrid::cell_samples(const std::uint32_t cell[3], int ring, double* out
 
 bool SparseGrid::find_brick(const double at[3], SparseHint& hint) const noexcept {
   // Also false for what is not a number.
-  const bool inside = at[0] >= 0.0 && at[1] >= 0.0 && at[2] >= 0.0 && at[0] < extent_.x() && at[1] < extent_.y() &&
-                      at[2] < extent_.z();
+  const bool inside =
+      at[0] >= 0.0 && at[1] >= 0.0 && at[2] >= 0.0 && at[0] < extent_.x() && at[1] < extent_.y() && at[2] < extent_.z();
   hint.owner = inside ? identity_ : 0;
   if (!inside) return false;
   for (std::size_t axis = 0; axis < 3; ++axis) {

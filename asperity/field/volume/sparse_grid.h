@@ -64,7 +64,7 @@ struct SparseHint {
   std::uint64_t owner = 0;  ///< identity of the grid; 0: nothing
   std::uint32_t at[3] = {no_index, no_index, no_index};
   double middle[3] = {0.0, 0.0, 0.0};  ///< of the brick, in cells of the bricks' box
-  const void* brick = nullptr;  ///< of the grid whose identity `owner` is; nullptr: none is stored there
+  const void* brick = nullptr;         ///< of the grid whose identity `owner` is; nullptr: none is stored there
 };
 
 /// Value and gradient of a potential.
