@@ -153,7 +153,7 @@ Result<Group> measure_fine(int subdivisions, const Effort& effort, double clock_
   for (const Fine& fine : all) {
     ASPERITY_TRY(Touch touch, touch_of(fine, surface, slide));
     if (fine.name != bare_contact && effort.counted == 0)
-      group.on_top.push_back({fine.name, extra_ns(bare, touch, effort.warm)});
+      group.on_top.push_back({fine.name, extra_ns(bare, touch, effort.warm), fine.features == lay ? 120.0 : 80.0});
     rows.emplace_back(fine.name, [touch = std::move(touch)](std::size_t tick) mutable { return touch.tick(tick); });
   }
   group.rows = measure(rows, effort, clock_cost);

@@ -1,8 +1,13 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
 
 #include "asperity/geometry/generators.h"
+#if defined(ASPERITY_HAS_OPENVDB)
+#include "bench/openvdb_peer.h"
+#endif
 #include "bench/rows.h"
 #include "bench/slide.h"
 
@@ -61,21 +66,41 @@ Result<Row> step_row(const std::string& name, const std::shared_ptr<const Sparse
   return sliding_row(name, {instance}, slide, {.start = 1.1 * sphere_radius});
 }
 
+constexpr std::size_t samples = 16;  // one is shorter than a reading of the clock
+
+/// Ten micrometres apart. All are ready before the first is asked for: a place that was written just before in parts is
+/// waited for, three times as long as sampling takes.
+std::array<Vec3, samples> places_from(const Vec3& first) {
+  std::array<Vec3, samples> places;
+  for (std::size_t i = 0; i < samples; ++i) places[i] = first + Vec3(1e-5 * static_cast<double>(i), 0.0, 0.0);
+  return places;
+}
+
 /// The sampling alone, where the slide is.
 Row sample_row(const std::string& name, const std::shared_ptr<const SparseGrid>& grid,
                const std::shared_ptr<const Slide>& slide,
                Potential (SparseGrid::*sample)(const Vec3&, SparseHint&) const noexcept) {
-  constexpr int samples = 16;  // one is shorter than a reading of the clock
   return Row(name, [grid, slide, sample, hint = SparseHint{}](std::size_t tick) mutable {
-    const Vec3 p = slide->probe(tick, 0.0);
     double sum = 0.0;
-    for (int i = 0; i < samples; ++i) {
-      const Potential here = ((*grid).*sample)(p + Vec3(1e-5 * i, 0.0, 0.0), hint);
+    for (const Vec3& p : places_from(slide->probe(tick, 0.0))) {
+      const Potential here = ((*grid).*sample)(p, hint);
       sum += here.value + here.gradient.x();
     }
     return sum != 0.0;
   });
 }
+
+#if defined(ASPERITY_HAS_OPENVDB)
+/// The same places.
+Row peer_row(const std::string& name, const std::shared_ptr<const OpenvdbPeer>& peer,
+             const std::shared_ptr<const Slide>& slide) {
+  return Row(name, [peer, slide](std::size_t tick) {
+    double sum = 0.0;
+    for (const Vec3& p : places_from(slide->probe(tick, 0.0))) sum += peer->value(p);
+    return sum != 0.0;
+  });
+}
+#endif
 
 }  // namespace
 
@@ -113,6 +138,16 @@ Result<Group> measure_potential(int subdivisions, const Effort& effort, double c
   ASPERITY_CHECK(add("proxy, trilinear", trilinear, ProxyLaw{}, true));
   rows.push_back(sample_row("16 x value and gradient, trilinear", grid, slide, &SparseGrid::trilinear));
   rows.push_back(sample_row("16 x value, node gradients", grid, slide, &SparseGrid::node_gradients));
+#if defined(ASPERITY_HAS_OPENVDB)
+  const auto peer = std::make_shared<const OpenvdbPeer>(grid->source());
+  for (std::size_t tick = 0; tick < std::min<std::size_t>(1000, effort.ticks()); ++tick) {
+    const Vec3 p = slide->probe(tick, 0.0);
+    SparseHint hint;
+    group.largest_disagreement =
+        std::max(group.largest_disagreement, std::abs(peer->value(p) - grid->trilinear(p, hint).value));
+  }
+  rows.push_back(peer_row("OpenVDB, 16 x value alone", peer, slide));
+#endif
   group.rows = measure(rows, effort, clock_cost);
   return group;
 }

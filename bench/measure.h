@@ -10,6 +10,9 @@
 namespace asperity::bench {
 
 using Clock = std::chrono::steady_clock;
+inline double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 /// Times of many updates, in nanoseconds.
 struct Latency {

@@ -14,10 +14,6 @@ namespace {
 
 constexpr double tracker_bound = 3e-3;  // m: what a tracker that knows the last distance would search within
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 /// How a row touches the mesh.
 struct MeshTouch {
   double radius = 0.0;     ///< m

@@ -23,10 +23,6 @@ namespace {
 
 using RayRelief = std::shared_ptr<const ReliefSurface>;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 // ---- bodies
 
 struct RayBody {

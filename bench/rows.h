@@ -37,6 +37,7 @@ inline constexpr const char* relief_rebuild = "relief, built anew";
 struct Extra {
   std::string what;
   double nanoseconds = 0.0;
+  double owed = 0.0;  ///< at most (ns)
 };
 
 /// What was measured on one mesh.
