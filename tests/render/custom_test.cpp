@@ -72,6 +72,34 @@ TEST(CustomSurfaceProxy, SlidesLikeTheParametricSphere) {
   }
 }
 
+// A ball touches its box where it is widest: there its tangents lead out of the box, and the surface does not end.
+TEST(CustomSurfaceProxy, GoesOnWhereTheSurfaceTouchesItsBox) {
+  const double radius = 0.011;
+  const Scene smooth = must(Scene::build({instance_of(surface_of(SmoothBall{Ball{radius}}))}, 0.0));
+  const Scene plain = must(Scene::build({instance_of(surface_of(Ball{radius}))}, 0.0));
+  for (const Scene* scene : {&smooth, &plain}) {
+    Rng rng(7);
+    for (int stroke = 0; stroke < 600; ++stroke) {
+      // From one side of a pole over it, by chance right over it, to the other side.
+      Vec3 pole = Vec3::Zero();
+      pole[static_cast<int>(rng.below(3))] = rng.below(2) == 0 ? 1.0 : -1.0;
+      const Vec3 way = pole.unitOrthogonal();
+      const Vec3 across = std::cos(rng.uniform(0.0, 6.28)) * way + std::sin(rng.uniform(0.0, 6.28)) * pole.cross(way);
+      const Vec3 aside = rng.uniform(0.0, 1.0) < 0.5 ? Vec3(Vec3::Zero()) : Vec3(rng.uniform(-0.1, 0.1) * pole.cross(across));
+      const auto out = [&](double angle) { return Vec3((pole + angle * across + aside).normalized()); };
+      const Vec3 from = out(-rng.uniform(0.01, 0.4));
+      const Vec3 to = out(rng.uniform(0.01, 0.4));
+      const double depth = rng.uniform(1e-4, 2e-3);
+      ProxyState state;
+      touch(*scene, state, 1.2 * radius * from);
+      touch(*scene, state, (radius - depth) * from);
+      const ForceSample felt = touch(*scene, state, (radius - depth) * to);
+      ASSERT_LT((felt.proxy - radius * to).norm(), 1e-6) << "stroke " << stroke << " from " << from.transpose()
+                                                         << " to " << to.transpose();
+    }
+  }
+}
+
 TEST(CustomSurfaceProxy, ForceStaysInTheConeOfFriction) {
   const double friction = 0.4;
   const Scene scene = must(Scene::build({instance_of(surface_of(Torus{}), Sides::front, friction)}, 0.0));

@@ -65,14 +65,22 @@ class FieldChart {
   static Turn turn(WalkStep&, const Vec3&, bool may_leave, int&) noexcept { return may_leave ? Turn::rim : Turn::rest; }
   [[nodiscard]] double reach(const WalkStep& step, int& border) const noexcept {
     const Vec3 way = direction(step);
-    const Box& box = surface_.facts().bounds;
+    const Vec3 bend = -drop(uu_, uv_, vv_, step.u, step.v) * spot_.front;
+    // Half of what a place may be off the box and still be held.
+    const Box box = surface_.facts().bounds.grown(0.5 * surface_.skin());
     double far = 1.0;
     for (int k = 0; k < 3; ++k) {
-      if (way[k] == 0.0) continue;
-      const double end = ((way[k] > 0.0 ? box.upper[k] : box.lower[k]) - spot_.point[k]) / way[k];
-      if (end >= far) continue;
-      far = std::max(0.0, end);
-      border = k;
+      // A tangent leads out of the box wherever the surface touches that, and the surface only where it does not bend
+      // back: the first share at which way and bend together go as far as there is room.
+      for (const double side : {-1.0, 1.0}) {
+        const double room = std::max(0.0, side > 0.0 ? box.upper[k] - spot_.point[k] : spot_.point[k] - box.lower[k]);
+        const double along = side * way[k];
+        const double square = along * along + 4.0 * side * bend[k] * room;
+        const double rate = square > 0.0 ? along + std::sqrt(square) : 0.0;
+        if (!(rate > 0.0) || 2.0 * room >= far * rate) continue;
+        far = 2.0 * room / rate;
+        border = k;
+      }
     }
     return far;
   }
@@ -85,8 +93,7 @@ class FieldChart {
   [[nodiscard]] static Vec3 moved(const Start& from, const WalkStep& step, double share, int) noexcept {
     const double u = share * step.u;
     const double v = share * step.v;
-    const double drop = 0.5 * (from.uu * u * u + 2.0 * from.uv * u * v + from.vv * v * v);
-    return from.point + u * from.along_u + v * from.along_v - drop * from.front;
+    return from.point + u * from.along_u + v * from.along_v - drop(from.uu, from.uv, from.vv, u, v) * from.front;
   }
   bool evaluate(Vec3 to, CustomSpot& spot) const noexcept {
     if (!view_.land(to) || !surface_.holds(to)) return false;
@@ -99,6 +106,10 @@ class FieldChart {
   }
 
  private:
+  /// How far the surface falls off its tangent plane.
+  [[nodiscard]] static double drop(double uu, double uv, double vv, double u, double v) noexcept {
+    return 0.5 * (uu * u * u + 2.0 * uv * u * v + vv * v * v);
+  }
   void face() noexcept {
     along_u_ = spot_.front.unitOrthogonal();
     along_v_ = spot_.front.cross(along_u_);
