@@ -42,13 +42,13 @@ class Bvh::Builder {
   void run() {
     const auto count = static_cast<std::uint32_t>(mesh_.triangles().size());
     Range all{0, count, take_primitives(count)};
-    bvh_.leaves_.reserve(count / 7 + 1);
-    bvh_.nodes_.reserve(count / 40 + 1);
+    Part whole;
+    whole.leaves.reserve(count / 7 + 1);
+    whole.nodes.reserve(count / 40 + 1);
     // The top by one thread, what is below it by all; how it is shared out does not depend on how many they are.
     constexpr std::uint32_t parts = 32;
     constexpr std::uint32_t least_part = 4096;
     Top top{std::max(count / parts, least_part), {}};
-    Part whole{std::move(bvh_.nodes_), std::move(bvh_.leaves_)};
     build_node(whole, all, 0, &top);
     std::vector<Part> built(top.parts.size());
     parallel_for(built.size(), {},

@@ -55,7 +55,7 @@ struct FaceBoxes {
 /// are const, allocation-free and safe from any thread. The mesh must outlive the hierarchy.
 class Bvh {
  public:
-  /// About 0.5 s for 1.3 M triangles. [build]
+  /// On all cores; the answer does not depend on how many they are. [build]
   static Bvh build(const TriangleMesh& mesh, const BvhSettings& settings = {});
   /// Fits boxes and leaves to another mesh of the same triangles; which triangles share a leaf stays. Every answer is
   /// the mesh's, as after building; only the time it takes may grow (see cost()). [build]

@@ -4,10 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <string>
 
+#include "asperity/core/parallel_for.h"
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/geometry/triangle_index.h"
@@ -98,6 +100,40 @@ TEST(Bvh, FirstHitEqualsBruteForce) {
       EXPECT_EQ(hit.face == no_index, std::isinf(first));
       EXPECT_TRUE(hit.face == no_index || hit.t == first);
     }
+  }
+}
+
+// Large meshes are built in parts, on all cores; within a loop that is shared already by one.
+TEST(Bvh, PartsOnAnyNumberOfThreadsMakeTheSameHierarchy) {
+  const TriangleMesh mesh = TriangleMesh::build(icosphere(6, 0.05)).value();
+  const auto order_of = [&](const Bvh& bvh) {
+    std::vector<std::uint32_t> order;
+    bvh.for_each_in_box(mesh.bounds(), [&](std::uint32_t face) { order.push_back(face); });
+    return order;
+  };
+  const Bvh shared = Bvh::build(mesh);
+  std::vector<std::uint32_t> alone[2];
+  parallel_for(2, {}, [&](std::size_t i) { alone[i] = order_of(Bvh::build(mesh)); });
+  std::vector<std::uint32_t> order = order_of(shared);
+  EXPECT_EQ(order, alone[0]);
+  EXPECT_EQ(order, alone[1]);
+  std::sort(order.begin(), order.end());
+  ASSERT_EQ(order.size(), mesh.triangles().size());
+  for (std::uint32_t face = 0; face < order.size(); ++face) ASSERT_EQ(order[face], face);
+  Rng rng(3);
+  for (int i = 0; i < 20; ++i) {
+    const Vec3 p = random_point(rng, mesh.bounds().grown(0.01));
+    EXPECT_NEAR(shared.closest(p, infinity).point.squared_distance, brute_squared_distance(mesh, p), 1e-18);
+  }
+}
+
+// What a leaf does not hold is memory that is paid for nevertheless.
+TEST(Bvh, LeavesAreFull) {
+  for (const int subdivisions : {4, 6}) {
+    const TriangleMesh mesh = TriangleMesh::build(icosphere(subdivisions, 0.05)).value();
+    const auto triangles = static_cast<double>(mesh.triangles().size());
+    // A leaf of eight with its cylinder is 352 bytes, 44 a triangle.
+    EXPECT_LT(static_cast<double>(Bvh::build(mesh).memory_bytes()), 60.0 * triangles) << subdivisions;
   }
 }
 

@@ -85,7 +85,8 @@ TEST(CustomSurfaceProxy, GoesOnWhereTheSurfaceTouchesItsBox) {
       pole[static_cast<int>(rng.below(3))] = rng.below(2) == 0 ? 1.0 : -1.0;
       const Vec3 way = pole.unitOrthogonal();
       const Vec3 across = std::cos(rng.uniform(0.0, 6.28)) * way + std::sin(rng.uniform(0.0, 6.28)) * pole.cross(way);
-      const Vec3 aside = rng.uniform(0.0, 1.0) < 0.5 ? Vec3(Vec3::Zero()) : Vec3(rng.uniform(-0.1, 0.1) * pole.cross(across));
+      const Vec3 aside =
+          rng.uniform(0.0, 1.0) < 0.5 ? Vec3(Vec3::Zero()) : Vec3(rng.uniform(-0.1, 0.1) * pole.cross(across));
       const auto out = [&](double angle) { return Vec3((pole + angle * across + aside).normalized()); };
       const Vec3 from = out(-rng.uniform(0.01, 0.4));
       const Vec3 to = out(rng.uniform(0.01, 0.4));
@@ -94,8 +95,8 @@ TEST(CustomSurfaceProxy, GoesOnWhereTheSurfaceTouchesItsBox) {
       touch(*scene, state, 1.2 * radius * from);
       touch(*scene, state, (radius - depth) * from);
       const ForceSample felt = touch(*scene, state, (radius - depth) * to);
-      ASSERT_LT((felt.proxy - radius * to).norm(), 1e-6) << "stroke " << stroke << " from " << from.transpose()
-                                                         << " to " << to.transpose();
+      ASSERT_LT((felt.proxy - radius * to).norm(), 1e-6)
+          << "stroke " << stroke << " from " << from.transpose() << " to " << to.transpose();
     }
   }
 }

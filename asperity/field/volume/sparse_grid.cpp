@@ -32,6 +32,12 @@ constexpr std::size_t apron_index(int i, int j, int k) noexcept {
   return static_cast<std::size_t>(i + 1 + apron_side * (j + 1 + apron_side * (k + 1)));
 }
 
+/// The first node of those of a cell and of `ring` more around them.
+constexpr std::size_t first_node(const std::uint32_t cell[3], int ring) noexcept {
+  return apron_index(static_cast<int>(cell[0]) - ring, static_cast<int>(cell[1]) - ring,
+                     static_cast<int>(cell[2]) - ring);
+}
+
 Status check_material(const PointMaterial& material, const std::string& place) {
   static constexpr const char* accepted[] = {"above 0 (N/m)", "0 or more (N·s/m)", "0 or more", "0 or more",
                                              "0 or more"};
@@ -468,11 +474,12 @@ bool SparseGrid::find_brick(const double at[3], SparseHint& hint) const noexcept
       at[0] >= 0.0 && at[1] >= 0.0 && at[2] >= 0.0 && at[0] < extent_.x() && at[1] < extent_.y() && at[2] < extent_.z();
   hint.owner = inside ? identity_ : 0;
   if (!inside) return false;
+  std::uint32_t brick[3];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    hint.at[axis] = static_cast<std::uint32_t>(at[axis]) / brick_cells;
-    hint.middle[axis] = (hint.at[axis] + 0.5) * brick_cells;
+    brick[axis] = static_cast<std::uint32_t>(at[axis]) / brick_cells;
+    hint.middle[axis] = (brick[axis] + 0.5) * brick_cells;
   }
-  const std::int32_t entry = table_[table_index(hint.at[0], hint.at[1], hint.at[2])];
+  const std::int32_t entry = table_[table_index(brick[0], brick[1], brick[2])];
   hint.brick = entry >= 0 ? bricks_[static_cast<std::size_t>(entry)].get() : nullptr;
   return true;
 }
@@ -492,43 +499,24 @@ inline const SparseGrid::Brick* SparseGrid::locate(const Vec3& p, SparseHint& hi
   return static_cast<const Brick*>(hint.brick);
 }
 
-void SparseGrid::far_nodes(const SparseHint& hint, const Place& place, int ring, double* out) const noexcept {
+void SparseGrid::far_samples(const SparseHint& hint, const Place& place, int ring, double* out) const noexcept {
   std::uint32_t cell[3];
-  for (std::size_t a = 0; a < 3; ++a) cell[a] = brick_cells * hint.at[a] + place.cell[a];
+  for (std::size_t a = 0; a < 3; ++a)
+    cell[a] = static_cast<std::uint32_t>(hint.middle[a]) - brick_cells / 2 + place.cell[a];
   cell_samples(cell, ring, out);
-}
-
-template <int Ring>
-bool SparseGrid::nodes_around(const Vec3& p, SparseHint& hint, Place& place, double* out) const noexcept {
-  constexpr int count = 2 + 2 * Ring;
-  if (const Brick* brick = locate(p, hint, place)) {
-    const float* first =
-        brick->value + apron_index(static_cast<int>(place.cell[0]) - Ring, static_cast<int>(place.cell[1]) - Ring,
-                                   static_cast<int>(place.cell[2]) - Ring);
-    for (int k = 0; k < count; ++k) {
-      for (int j = 0; j < count; ++j) {
-        for (int i = 0; i < count; ++i) *out++ = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
-      }
-    }
-    return true;
-  }
-  if (hint.owner == 0) return false;
-  far_nodes(hint, place, Ring, out);
-  return true;
 }
 
 Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept {
   Place place;
   if (const Brick* brick = locate(p, hint, place)) {
-    const float* first = brick->value + apron_index(static_cast<int>(place.cell[0]), static_cast<int>(place.cell[1]),
-                                                    static_cast<int>(place.cell[2]));
+    const float* first = brick->value + first_node(place.cell, 0);
     constexpr int layer = apron_side * apron_side;
     return interpolated(edge_at(first), edge_at(first + apron_side), edge_at(first + layer),
                         edge_at(first + layer + apron_side), place.fraction, per_voxel_);
   }
   if (hint.owner == 0) return {outside_, Vec3::Zero()};
   double c[8];
-  far_nodes(hint, place, 0, c);
+  far_samples(hint, place, 0, c);
   return interpolated(Pair{c[0], c[1]}, Pair{c[2], c[3]}, Pair{c[4], c[5]}, Pair{c[6], c[7]}, place.fraction,
                       per_voxel_);
 }
@@ -537,7 +525,18 @@ template <class Take>
 bool SparseGrid::take_nodes(const Vec3& p, SparseHint& hint, const Take& take) const noexcept {
   Place place;
   double c[64];
-  if (!nodes_around<1>(p, hint, place, c)) return false;
+  if (const Brick* brick = locate(p, hint, place)) {
+    const float* first = brick->value + first_node(place.cell, 1);
+    double* out = c;
+    for (int k = 0; k < 4; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        for (int i = 0; i < 4; ++i) *out++ = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
+      }
+    }
+  } else {
+    if (hint.owner == 0) return false;
+    far_samples(hint, place, 1, c);
+  }
   for (int n = 0; n < 8; ++n) {
     const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
     double weight = 1.0;

@@ -61,8 +61,7 @@ struct SparseSource {
 
 /// Which brick was read last. A cache in the caller's hands. [servo]
 struct SparseHint {
-  std::uint64_t owner = 0;  ///< identity of the grid; 0: nothing
-  std::uint32_t at[3] = {no_index, no_index, no_index};
+  std::uint64_t owner = 0;             ///< identity of the grid; 0: nothing
   double middle[3] = {0.0, 0.0, 0.0};  ///< of the brick, in cells of the bricks' box
   const void* brick = nullptr;         ///< of the grid whose identity `owner` is; nullptr: none is stored there
 };
@@ -161,11 +160,8 @@ class SparseGrid {
   const Brick* locate(const Vec3& p, SparseHint& hint, Place& place) const noexcept;
   /// Makes the hint that of a place, in cells of the bricks' box; false beyond that.
   bool find_brick(const double at[3], SparseHint& hint) const noexcept;
-  /// The nodes around a place where no brick is stored.
-  void far_nodes(const SparseHint& hint, const Place& place, int ring, double* out) const noexcept;
-  /// The nodes of the cell that holds p and `Ring` more around them, as cell_samples; false beyond the bricks' box.
-  template <int Ring>
-  bool nodes_around(const Vec3& p, SparseHint& hint, Place& place, double* out) const noexcept;
+  /// cell_samples around a place where no brick is stored.
+  void far_samples(const SparseHint& hint, const Place& place, int ring, double* out) const noexcept;
   /// take(weight, value, gradient times two voxels) of the eight nodes around p; false beyond the bricks' box.
   template <class Take>
   bool take_nodes(const Vec3& p, SparseHint& hint, const Take& take) const noexcept;
