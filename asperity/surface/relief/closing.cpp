@@ -115,6 +115,30 @@ double ClosedRelief::rise_at(std::uint32_t face, const Vec3& barycentric) const 
 
 namespace {
 
+/// Faces along a Morton curve through their middles: those that follow one another lie side by side.
+std::vector<std::uint32_t> along_a_curve(const TriangleMesh& mesh) {
+  constexpr int bits = 21;
+  const Box box = mesh.bounds();
+  const double scale = ((1 << bits) - 1) / std::max(box.extent().maxCoeff(), std::numeric_limits<double>::min());
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
+  keys.reserve(mesh.triangles().size());
+  for (std::uint32_t face = 0; face < mesh.triangles().size(); ++face) {
+    const auto [a, b, c] = mesh.corners(face);
+    const Vec3 cell = scale * ((a + b + c) / 3.0 - box.lower);
+    std::uint64_t key = 0;
+    for (int bit = bits - 1; bit >= 0; --bit) {
+      for (int axis = 0; axis < 3; ++axis)
+        key = key << 1U | (static_cast<std::uint64_t>(cell[axis]) >> static_cast<unsigned>(bit) & 1U);
+    }
+    keys.emplace_back(key, face);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> order;
+  order.reserve(keys.size());
+  for (const auto& [key, face] : keys) order.push_back(face);
+  return order;
+}
+
 /// One level of detail (0: the relief itself) closed into `closed`, whose atlas and rises are 0.
 void close_level(const ReliefSurface& surface, const CoatMoment& moment, const Progress& progress,
                  ClosedRelief& closed) {
@@ -129,12 +153,14 @@ void close_level(const ReliefSurface& surface, const CoatMoment& moment, const P
   parallel.to = settled;
   std::vector<ClosedFace> faces(count);
   std::vector<std::unique_ptr<FaceCloser>> closers(parallel_workers(count, parallel));
-  parallel_for(count, parallel, [&](std::size_t face, unsigned worker) {
+  const std::vector<std::uint32_t> order = along_a_curve(mesh);
+  parallel_for(count, parallel, [&](std::size_t i, unsigned worker) {
     if (closers[worker] == nullptr) {
       closers[worker] =
           std::make_unique<FaceCloser>(surface, samples, moment, settings.radius, closed.report.tolerance);
     }
-    faces[face] = closers[worker]->close(static_cast<std::uint32_t>(face), closed);
+    if (i % faces_a_share == 0) closers[worker]->start_anew();
+    faces[order[i]] = closers[worker]->close(order[i], closed);
   });
   closers.clear();
   sum_up(mesh, faces, closed.report);

@@ -20,6 +20,7 @@ constexpr double settled_of_radius = 2e-4;
 // rolls off it by this share of the radius.
 constexpr double least_curvature = 0.04;
 constexpr double roll_of_radius = 0.15;
+constexpr double most_roll_of_radius = 0.1;
 // A way along which the height falls by less than this share of the radius is not gone.
 constexpr double gain_of_radius = 2.5e-4;
 constexpr double most_move_of_radius = 0.5;
@@ -305,7 +306,19 @@ BallSolver::Move BallSolver::move_from(const Vec3& centre, const Vec3& held) con
         return move;
       }
       move.rolls = rolls;
-      move.by += (std::clamp(newton, -0.4 * radius_, 0.4 * radius_) - along) * way;
+      const double on = std::clamp(newton, -most_roll_of_radius * radius_, most_roll_of_radius * radius_);
+      move.by += (on - along) * way;
+      // The contacts bend away under the way: the ball stays on them, to second order.
+      const auto falls = [&](int k) { return 0.5 * on * on / radius_ * bend(contacts_[move.rest.active[k]], way); };
+      if (move.rest.count == 1) {
+        move.by -= falls(0) * first;
+      } else {
+        const Vec3& second = walls[move.rest.active[1]].normal;
+        const double cosine = first.dot(second);
+        const double one = falls(0);
+        const double other = falls(1);
+        move.by -= ((one - cosine * other) * first + (other - cosine * one) * second) / (1.0 - cosine * cosine);
+      }
     }
   }
   const double most = most_move_of_radius * radius_;
@@ -347,8 +360,9 @@ double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall&
       return not_a_number;
     Move move = move_from(centre, held);
     if (!move.known) return not_a_number;
-    // Between walls that bend the ball may swing to and fro.
-    const bool swings = move.by.dot(before) < 0.0 && move.by.squaredNorm() > 0.1 * before.squaredNorm();
+    // Between walls that bend the ball may swing to and fro; on three it has nowhere to.
+    const bool swings =
+        move.rest.count < 3 && move.by.dot(before) < 0.0 && move.by.squaredNorm() > 0.1 * before.squaredNorm();
     share = swings ? 0.5 * share : std::min(1.0, 1.4 * share);
     before = move.by;
     move.by *= share;

@@ -266,6 +266,7 @@ FaceCloser::Known FaceCloser::settle(const Texel& texel, const Known* before, co
 
 void FaceCloser::close_texels(int stride, bool coarsest) {
   const Known* last = nullptr;
+  Known lowest;
   for (int i = 0; i <= texels_; i += stride) {
     for (int j = 0; i + j <= texels_; j += stride) {
       const bool odd_i = i / stride % 2 != 0;
@@ -279,9 +280,9 @@ void FaceCloser::close_texels(int stride, bool coarsest) {
         const bool between = i + std::abs(di) + j + dj <= texels_ && i + di + j + dj <= texels_;
         // Beside a rim a ball may hold what lies between from below the line through both.
         if (between && !at_rim(texel) && bound(texel, di, dj)) continue;
-        const Known& one = known(i - di, j - dj);
-        start = &one;
-        if (between && known(i + di, j + dj).ball == known(i, j).ball) start = &known(i + di, j + dj);
+        // From the ball that comes lowest of those around.
+        lowest = between ? known(i, j) : Known{nowhere, nowhere, no_index};
+        start = lowest.ball != no_index && std::isfinite(lowest.upper) ? &lowest : &known(i - di, j - dj);
       }
       settle_texel(texel, start);
       if (std::isfinite(known(i, j).lower)) last = &known(i, j);
@@ -342,7 +343,6 @@ ClosedFace FaceCloser::close(std::uint32_t face, ClosedRelief& closed) {
   face_ = face;
   nodes_a_texel_ = samples_.cuts(face) / texels_;
   prism_ = samples_.prism(face);
-  solver_.start_anew();
   balls_.clear();
   unsettled_.clear();
   known_.assign(static_cast<std::size_t>((texels_ + 1) * (texels_ + 2) / 2), Known{});

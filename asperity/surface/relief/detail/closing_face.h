@@ -19,11 +19,12 @@ struct ClosedFace {
   double largest_rise = 0.0;    ///< m, of the changed
 };
 
-/// One thread's own; what it answers of a face does not depend on the faces before.
+/// One thread's own; what it answers of a face does not depend on the faces before `start_anew`.
 class FaceCloser {
  public:
   FaceCloser(const ReliefSurface& surface, const ReliefSamples& samples, const CoatMoment& moment, double radius,
              double tolerance);
+  void start_anew() noexcept { solver_.start_anew(); }
   /// Finds by how much every texel over the face rises, into `closed.rise`.
   ClosedFace close(std::uint32_t face, ClosedRelief& closed);
 

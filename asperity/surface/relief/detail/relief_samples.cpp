@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asperity/core/processor.h"
+#include "asperity/surface/relief/detail/block_lanes.h"
 
 namespace asperity {
 
@@ -44,75 +44,6 @@ void for_each_square(int i0, int j0, int nodes, int side, int cuts, Visit&& visi
     for (int j = j0; j < j0 + nodes && i + j <= cuts; j += side) visit(i, j);
   }
 }
-
-#define ASPERITY_INLINE [[gnu::always_inline]] inline
-
-/// The least squared distance to a place that a node of each of some blocks may have.
-ASPERITY_INLINE void bound_all(const std::array<const float*, 8>& block, std::size_t count, const Vec3f& c, float* to) {
-  const float cx = c.x();
-  const float cy = c.y();
-  const float cz = c.z();
-  for (std::size_t k = 0; k < count; ++k) {
-    const float x = cx - block[0][k];
-    const float y = cy - block[1][k];
-    const float z = cz - block[2][k];
-    const float square = x * x + y * y + z * z;
-    const float up = x * block[4][k] + y * block[5][k] + z * block[6][k];
-    const float over = up - block[7][k] > 0.0F ? up - block[7][k] : 0.0F;
-    const float aside = square - up * up > 0.0F ? square - up * up : 0.0F;
-    const float lateral = std::sqrt(aside) - block[3][k];
-    const float beside = lateral > 0.0F ? lateral : 0.0F;
-    const float around = std::sqrt(square) - block[3][k];
-    const float sphere = around > 0.0F ? around * around : 0.0F;
-    const float slab = over * over + beside * beside;
-    to[k] = slab > sphere ? slab : sphere;
-  }
-}
-
-/// Squared distances of a block's nodes to a place, and the least of them.
-ASPERITY_INLINE float square_all(const float* places, const Vec3f& c, float* to) {
-  constexpr std::size_t lanes = 8;
-  const float cx = c.x();
-  const float cy = c.y();
-  const float cz = c.z();
-  float least[lanes];
-  for (std::size_t l = 0; l < lanes; ++l) least[l] = std::numeric_limits<float>::max();
-  for (std::size_t k = 0; k < block_nodes; k += lanes) {
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const float x = places[k + l] - cx;
-      const float y = places[block_nodes + k + l] - cy;
-      const float z = places[2 * block_nodes + k + l] - cz;
-      const float square = x * x + y * y + z * z;
-      to[k + l] = square;
-      least[l] = square < least[l] ? square : least[l];
-    }
-  }
-  float all = least[0];
-  for (std::size_t l = 1; l < lanes; ++l) all = least[l] < all ? least[l] : all;
-  return all;
-}
-
-void bound_plain(const std::array<const float*, 8>& block, std::size_t count, const Vec3f& c, float* to) {
-  bound_all(block, count, c, to);
-}
-float square_plain(const float* places, const Vec3f& c, float* to) {
-  return square_all(places, c, to);
-}
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) void bound_avx2(const std::array<const float*, 8>& block, std::size_t count,
-                                                const Vec3f& c, float* to) {
-  bound_all(block, count, c, to);
-}
-__attribute__((target("avx2"))) float square_avx2(const float* places, const Vec3f& c, float* to) {
-  return square_all(places, c, to);
-}
-const auto bound_blocks = has_avx2() ? bound_avx2 : bound_plain;
-const auto square_nodes = has_avx2() ? square_avx2 : square_plain;
-#else
-const auto bound_blocks = bound_plain;
-const auto square_nodes = square_plain;
-#endif
-#undef ASPERITY_INLINE
 
 }  // namespace
 
@@ -260,7 +191,7 @@ void ReliefSamples::enclose(Chunk& chunk, std::vector<float>& places) {
 }
 
 NearSamples::NearSamples(const ReliefSamples& samples, double bound)
-    : samples_(samples), bound_(bound), slack_(0.1 * bound), slot_of_chunk_(samples.chunks().size(), -1) {
+    : samples_(samples), bound_(bound), slack_(0.4 * bound), slot_of_chunk_(samples.chunks().size(), -1) {
   std::uint32_t blocks = 1;
   for (const ReliefSamples::Chunk& chunk : samples.chunks()) blocks = std::max(blocks, chunk.blocks);
   most_held_ = std::max<std::size_t>(16, chunk_bytes_held / (3 * sizeof(float) * block_nodes * blocks));
@@ -297,25 +228,40 @@ const float* NearSamples::places_of(std::uint32_t chunk) {
   return one.places.data();
 }
 
+void NearSamples::Blocks::clear() {
+  blocks.clear();
+  for (auto& row : rows) row.clear();
+}
+
+void NearSamples::Blocks::add(const Block& block, const float (&values)[8]) {
+  blocks.push_back(block);
+  for (std::size_t i = 0; i < 8; ++i) rows[i].push_back(values[i]);
+}
+
+std::array<const float*, 8> NearSamples::Blocks::columns() const {
+  std::array<const float*, 8> columns;
+  for (std::size_t i = 0; i < 8; ++i) columns[i] = rows[i].data();
+  return columns;
+}
+
 void NearSamples::gather(const Vec3& centre) {
   gathered_at_ = centre;
   gathered_ = 3.0 * bound_;
   chunks_.clear();
-  for (auto& column : around_) column.clear();
-  samples_.for_each_chunk(centre, gathered_, [&](std::uint32_t chunk) { chunks_.push_back({chunk, 0}); });
-  std::sort(chunks_.begin(), chunks_.end(), [](const Gathered& a, const Gathered& b) { return a.chunk < b.chunk; });
-  for (Gathered& one : chunks_) {
-    one.first = static_cast<std::uint32_t>(around_[0].size());
-    const ReliefSamples::Chunk& chunk = samples_.chunks()[one.chunk];
+  around_.clear();
+  samples_.for_each_chunk(centre, gathered_, [&](std::uint32_t chunk) { chunks_.push_back(chunk); });
+  std::sort(chunks_.begin(), chunks_.end());
+  for (const std::uint32_t one : chunks_) {
+    const ReliefSamples::Chunk& chunk = samples_.chunks()[one];
     const Vec3f from = (chunk.centre - centre).cast<float>();
-    for (std::uint32_t k = 0; k < chunk.blocks; ++k) {
-      const ReliefSamples::Block& block = samples_.blocks()[chunk.block + k];
+    for (std::uint32_t k = chunk.block; k < chunk.block + chunk.blocks; ++k) {
+      const ReliefSamples::Block& block = samples_.blocks()[k];
       const Vec3f at = from + block.centre;
-      const float values[8] = {at.x(),           at.y(),           at.z(),           block.radius,
-                               block.normal.x(), block.normal.y(), block.normal.z(), block.top};
-      for (std::size_t i = 0; i < 8; ++i) around_[i].push_back(values[i]);
+      around_.add({one, k, nullptr}, {at.x(), at.y(), at.z(), block.radius, block.normal.x(), block.normal.y(),
+                                      block.normal.z(), block.top});
     }
   }
+  nearest_.resize(std::max(nearest_.size(), around_.blocks.size()));
 }
 
 void NearSamples::list(const Vec3& centre) {
@@ -323,40 +269,44 @@ void NearSamples::list(const Vec3& centre) {
   ++time_;
   listed_at_ = centre;
   listed_ = true;
-  entries_.clear();
-  for (auto& column : blocks_) column.clear();
+  list_.clear();
   const auto reach = static_cast<float>((bound_ + slack_) * (bound_ + slack_) * (1.0 + 1e-5));
-  const Vec3f from = (centre - gathered_at_).cast<float>();
-  for (const Gathered& one : chunks_) {
-    const ReliefSamples::Chunk& chunk = samples_.chunks()[one.chunk];
-    const double within = bound_ + slack_ + chunk.radius;
-    if ((chunk.centre - centre).squaredNorm() > within * within) continue;
-    std::array<const float*, 8> column;
-    for (std::size_t i = 0; i < 8; ++i) column[i] = around_[i].data() + one.first;
-    nearest_.resize(std::max<std::size_t>(nearest_.size(), chunk.blocks));
-    bound_blocks(column, chunk.blocks, from, nearest_.data());
-    const float* places = nullptr;
-    for (std::uint32_t k = 0; k < chunk.blocks; ++k) {
-      if (nearest_[k] > reach) continue;
-      if (places == nullptr) places = places_of(one.chunk);
-      entries_.push_back({one.chunk, chunk.block + k, places + 3 * block_nodes * k});
-      for (std::size_t i = 0; i < 8; ++i) blocks_[i].push_back(column[i][k]);
+  const std::array<const float*, 8> columns = around_.columns();
+  bound_blocks(columns, around_.blocks.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
+  std::uint32_t chunk = no_index;
+  const float* places = nullptr;
+  for (std::size_t k = 0; k < around_.blocks.size(); ++k) {
+    if (nearest_[k] > reach) continue;
+    Block one = around_.blocks[k];
+    if (one.chunk != chunk) {
+      chunk = one.chunk;
+      places = places_of(chunk);
     }
+    one.places = places + 3 * block_nodes * (one.block - samples_.chunks()[chunk].block);
+    list_.add(one, {columns[0][k], columns[1][k], columns[2][k], columns[3][k], columns[4][k], columns[5][k],
+                    columns[6][k], columns[7][k]});
   }
-  nearest_.resize(std::max(nearest_.size(), entries_.size()));
 }
 
 NearSamples::Found NearSamples::search(const Vec3& centre, double bound, bool any) {
   if (!listed_ || (centre - listed_at_).squaredNorm() > slack_ * slack_) list(centre);
-  std::array<const float*, 8> column;
-  for (std::size_t i = 0; i < 8; ++i) column[i] = blocks_[i].data();
-  bound_blocks(column, entries_.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
+  bound_blocks(list_.columns(), list_.blocks.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
   Found found;
   auto best = static_cast<float>(bound * bound);
-  float squares[block_nodes];
-  for (std::size_t k = 0; k < entries_.size(); ++k) {
+  in_reach_.clear();
+  std::size_t first = 0;
+  for (std::uint32_t k = 0; k < list_.blocks.size(); ++k) {
     if (nearest_[k] >= best) continue;
-    const Listed& entry = entries_[k];
+    if (!in_reach_.empty() && nearest_[k] < nearest_[in_reach_[first]]) first = in_reach_.size();
+    in_reach_.push_back(k);
+  }
+  if (in_reach_.empty()) return found;
+  // What comes closest first: of the others few are left.
+  std::swap(in_reach_[0], in_reach_[first]);
+  float squares[block_nodes];
+  for (const std::uint32_t k : in_reach_) {
+    if (nearest_[k] >= best) continue;
+    const Block& entry = list_.blocks[k];
     const ReliefSamples::Chunk& chunk = samples_.chunks()[entry.chunk];
     const float least = square_nodes(entry.places, (centre - chunk.centre).cast<float>(), squares);
     if (least >= best) continue;

@@ -9,13 +9,11 @@
 #include <vector>
 
 #include "asperity/core/parallel_for.h"
+#include "asperity/surface/relief/detail/block_lanes.h"
 #include "asperity/surface/relief/surface.h"
 
 namespace asperity {
 
-/// Samples a side of a block, which is looked at as a whole.
-inline constexpr int block_side = 8;
-inline constexpr std::size_t block_nodes = std::size_t{block_side} * block_side;
 /// Blocks a side of a chunk, whose places are held at once.
 inline constexpr int chunk_side = 8;
 
@@ -160,27 +158,30 @@ class NearSamples {
   const ReliefSamples& samples_;
   double bound_;
   double slack_;  ///< how far places may lie from where the list was made (m)
-  // Chunks around.
+  struct Block {
+    std::uint32_t chunk;
+    std::uint32_t block;
+    const float* places;  ///< of its nodes, in a list alone
+  };
+  /// Blocks, and each number of theirs in a row of its own: place, radius, normal, top.
+  struct Blocks {
+    std::vector<Block> blocks;
+    std::array<std::vector<float>, 8> rows;
+    void clear();
+    void add(const Block& block, const float (&values)[8]);
+    [[nodiscard]] std::array<const float*, 8> columns() const;
+  };
+  // Those of the chunks around, their places from where they were gathered.
   Vec3 gathered_at_ = Vec3::Zero();
   double gathered_ = -1.0;  ///< how far around (m)
-  struct Gathered {
-    std::uint32_t chunk;
-    std::uint32_t first;  ///< of its blocks in `around_`
-  };
-  std::vector<Gathered> chunks_;
-  // Their blocks, each number in a row of its own: place from where they were gathered, radius, normal, top.
-  std::array<std::vector<float>, 8> around_;
+  std::vector<std::uint32_t> chunks_;
+  Blocks around_;
   // Those of them that a ball comes near anywhere within the slack of where the list was made.
   Vec3 listed_at_ = Vec3::Zero();
   bool listed_ = false;
-  std::array<std::vector<float>, 8> blocks_;
-  struct Listed {
-    std::uint32_t chunk;
-    std::uint32_t block;
-    const float* places;
-  };
-  std::vector<Listed> entries_;
-  std::vector<float> nearest_;  ///< scratch: squared distances that no node of a block is within
+  Blocks list_;
+  std::vector<float> nearest_;           ///< scratch: squared distances that no node of a block is within
+  std::vector<std::uint32_t> in_reach_;  ///< scratch: of the list, what may hold a node within the bound
   // Places of chunks that were looked at.
   std::uint64_t time_ = 0;
   std::size_t hand_ = 0;
