@@ -274,41 +274,89 @@ FieldSample ReliefSurface::fillet_field(const ReliefFrame& frame, const ShellPla
   return sample;
 }
 
-FieldSample ReliefSurface::round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
-  const Stitching& stitching = coat_.settings().stitching;
-  if (stitching.folds == FoldMode::fillet) return fillet_field(frame, place);
-  const Vec3 p = frame.prism.point(place);
-  double weights = 0.0;
-  double values = 0.0;
-  double heights = 0.0;
-  Vec3 weight_gradient = Vec3::Zero();
-  Vec3 value_gradient = Vec3::Zero();
-  const auto add = [&](const ReliefFrame& one, const ShellPlace& at) {
-    const HeightJet weight = place_weight(stitching, one.band, at.u, at.v);
+/// A face that may have a say at places over one place of another face, and where the last of them was over it.
+struct ReliefSurface::RoundPartner {
+  ReliefFrame frame;
+  ShellPlace place;
+  Vec3 last;            ///< that place (m)
+  double beyond = 0.0;  ///< how far beyond having a say it was, in its coordinates
+  double change = 0.0;  ///< how fast those change, at most (1/m)
+  /// Over the place `over` of `from`; whether any of it is seen from there.
+  bool begin(const ReliefFrame& from, const ShellPlace& over, const ReliefFrame& own) {
+    const Projection guess = project(from.prism, over.u, over.v, own.prism);
+    if (!guess.seen) return false;
+    frame = own;
+    place = {guess.u, guess.v, over.height};
+    const Vec3 third = own.prism.edge_v - own.prism.edge_u;
+    const double longest = std::max({own.prism.edge_u.norm(), own.prism.edge_v.norm(), third.norm()});
+    // Twice what it is over the base: directions turn.
+    change = 2.0 * longest / own.prism.edge_u.cross(own.prism.edge_v).norm();
+    return true;
+  }
+};
+
+/// Sums over the faces that have a say at a place, each by its weight.
+class ReliefSurface::RoundSum {
+ public:
+  RoundSum(const ReliefSurface& surface, const ReliefFrame& frame, const ShellPlace& place)
+      : surface_(surface), face_(frame.face), point_(frame.prism.point(place)) {
+    add(frame, place);
+  }
+  /// From where the face's place was before, if it was anywhere.
+  void add(RoundPartner& partner) {
+    if (partner.beyond > 0.0 && partner.beyond > partner.change * (point_ - partner.last).norm()) return;
+    ShellPlace at = partner.place;
+    partner.beyond = 0.0;
+    if (!partner.frame.prism.invert(point_, at)) return;
+    partner.place = at;
+    partner.last = point_;
+    for (int k = 0; k < 3; ++k) {
+      const double coordinates = coordinate(k, at.u, at.v) + static_cast<double>(partner.frame.band.rho[k]);
+      partner.beyond = std::max(partner.beyond, -coordinates);
+    }
+    if (partner.beyond <= 0.0) add(partner.frame, at);
+  }
+  [[nodiscard]] FieldSample sample() const {
+    FieldSample sample;
+    sample.element = face_;
+    sample.value = values_ / weights_;
+    sample.height = heights_ / weights_;
+    sample.gradient = (value_gradient_ - sample.value * weight_gradient_) / weights_;
+    return sample;
+  }
+
+ private:
+  void add(const ReliefFrame& one, const ShellPlace& at) {
+    const HeightJet weight = place_weight(surface_.coat_.settings().stitching, one.band, at.u, at.v);
     if (weight.height <= 0.0) return;
-    const FieldSample own = own_field(one, at);
+    const FieldSample own = surface_.own_field(one, at);
     const ShellGradients gradients = shell_gradients(one.prism, at);
     const Vec3 slope = weight.u * gradients.u + weight.v * gradients.v;
-    weights += weight.height;
-    values += weight.height * own.value;
-    heights += weight.height * own.height;
-    weight_gradient += slope;
-    value_gradient += own.value * slope + weight.height * own.gradient;
-  };
-  add(frame, place);
+    weights_ += weight.height;
+    values_ += weight.height * own.value;
+    heights_ += weight.height * own.height;
+    weight_gradient_ += slope;
+    value_gradient_ += own.value * slope + weight.height * own.gradient;
+  }
+
+  const ReliefSurface& surface_;
+  std::uint32_t face_;
+  Vec3 point_;
+  double weights_ = 0.0;
+  double values_ = 0.0;
+  double heights_ = 0.0;
+  Vec3 weight_gradient_ = Vec3::Zero();
+  Vec3 value_gradient_ = Vec3::Zero();
+};
+
+FieldSample ReliefSurface::round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept {
+  if (coat_.settings().stitching.folds == FoldMode::fillet) return fillet_field(frame, place);
+  RoundSum sum(*this, frame, place);
   for_each_partner(frame, place.u, place.v, [&](std::uint32_t other) {
-    const ReliefFrame there = this->frame(other, frame.coat.moment);
-    const Projection guess = project(frame.prism, place.u, place.v, there.prism);
-    if (!guess.seen) return;
-    ShellPlace at{guess.u, guess.v, place.height};
-    if (there.prism.invert(p, at)) add(there, at);
+    RoundPartner partner;
+    if (partner.begin(frame, place, this->frame(other, frame.coat.moment))) sum.add(partner);
   });
-  FieldSample sample;
-  sample.element = frame.face;
-  sample.value = values / weights;
-  sample.height = heights / weights;
-  sample.gradient = (value_gradient - sample.value * weight_gradient) / weights;
-  return sample;
+  return sum.sample();
 }
 
 HeightJet ReliefSurface::rounded(const ReliefFrame& frame, double u, double v) const noexcept {
@@ -318,9 +366,24 @@ HeightJet ReliefSurface::rounded(const ReliefFrame& frame, double u, double v) c
   constexpr int most_steps = 12;
   const Vec3 direction = frame.prism.direction_at(u, v);
   ShellPlace at{u, v, jet.height};
+  // Faces are the same all the way up the ray: made ready once, unless they are many.
+  FixedVector<RoundPartner, 12> partners;
+  bool all = coat_.settings().stitching.folds != FoldMode::fillet;
+  if (all) {
+    for_each_partner(frame, u, v, [&](std::uint32_t other) {
+      RoundPartner partner;
+      if (all && partner.begin(frame, at, this->frame(other, frame.coat.moment))) all = partners.push_back(partner);
+    });
+  }
+  const auto field_at = [&] {
+    if (!all) return round_field(frame, at);
+    RoundSum sum(*this, frame, at);
+    for (RoundPartner& partner : partners) sum.add(partner);
+    return sum.sample();
+  };
   FieldSample sample;
   for (int i = 0; i < most_steps; ++i) {
-    sample = round_field(frame, at);
+    sample = field_at();
     const double rise = sample.gradient.dot(direction);
     if (!(rise > 0.1)) break;
     const double step = sample.value / rise;

@@ -224,6 +224,8 @@ class ReliefSurface {
   [[nodiscard]] double share_across(const ReliefFrame& frame, const ShellPlace& place, const ShellGradients& gradients,
                                     std::uint32_t other, Vec3& gradient) const noexcept;
   [[nodiscard]] FieldSample fillet_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
+  struct RoundPartner;
+  class RoundSum;
   [[nodiscard]] FieldSample round_field(const ReliefFrame& frame, const ShellPlace& place) const noexcept;
   [[nodiscard]] HeightJet height(const ReliefFrame& frame, double u, double v, bool blended) const noexcept;
   /// Whether other faces have a say at a place.
