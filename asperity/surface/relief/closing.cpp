@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "asperity/core/parallel_for.h"
 #include "asperity/surface/relief/detail/closing_border.h"
@@ -159,6 +161,7 @@ void close_level(const ReliefSurface& surface, const CoatMoment& moment, const P
       closers[worker] =
           std::make_unique<FaceCloser>(surface, samples, moment, settings.radius, closed.report.tolerance);
     }
+    // Shares begin at multiples of this on any number of threads.
     if (i % faces_a_share == 0) closers[worker]->start_anew();
     faces[order[i]] = closers[worker]->close(order[i], closed);
   });

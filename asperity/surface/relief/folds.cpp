@@ -280,18 +280,26 @@ struct ReliefSurface::RoundPartner {
   ShellPlace place;
   Vec3 last;            ///< that place (m)
   double beyond = 0.0;  ///< how far beyond having a say it was, in its coordinates
-  double change = 0.0;  ///< how fast those change, at most (1/m)
+  double change = 0.0;  ///< how fast those change around it, and twice as much (1/m); where `beyond` is above 0
   /// Over the place `over` of `from`; whether any of it is seen from there.
   bool begin(const ReliefFrame& from, const ShellPlace& over, const ReliefFrame& own) {
     const Projection guess = project(from.prism, over.u, over.v, own.prism);
     if (!guess.seen) return false;
     frame = own;
     place = {guess.u, guess.v, over.height};
-    const Vec3 third = own.prism.edge_v - own.prism.edge_u;
-    const double longest = std::max({own.prism.edge_u.norm(), own.prism.edge_v.norm(), third.norm()});
-    // Twice what it is over the base: directions turn.
-    change = 2.0 * longest / own.prism.edge_u.cross(own.prism.edge_v).norm();
     return true;
+  }
+  /// Takes note of where it is now; whether it may have a say there.
+  bool move_to(const ShellPlace& at, const Vec3& point) {
+    place = at;
+    last = point;
+    beyond = 0.0;
+    for (int k = 0; k < 3; ++k)
+      beyond = std::max(beyond, -coordinate(k, at.u, at.v) - static_cast<double>(frame.band.rho[k]));
+    if (beyond <= 0.0) return true;
+    const ShellGradients by = shell_gradients(frame.prism, at);
+    change = 2.0 * std::max({by.u.norm(), by.v.norm(), (by.u + by.v).norm()});
+    return false;
   }
 };
 
@@ -307,14 +315,7 @@ class ReliefSurface::RoundSum {
     if (partner.beyond > 0.0 && partner.beyond > partner.change * (point_ - partner.last).norm()) return;
     ShellPlace at = partner.place;
     partner.beyond = 0.0;
-    if (!partner.frame.prism.invert(point_, at)) return;
-    partner.place = at;
-    partner.last = point_;
-    for (int k = 0; k < 3; ++k) {
-      const double coordinates = coordinate(k, at.u, at.v) + static_cast<double>(partner.frame.band.rho[k]);
-      partner.beyond = std::max(partner.beyond, -coordinates);
-    }
-    if (partner.beyond <= 0.0) add(partner.frame, at);
+    if (partner.frame.prism.invert(point_, at) && partner.move_to(at, point_)) add(partner.frame, at);
   }
   [[nodiscard]] FieldSample sample() const {
     FieldSample sample;

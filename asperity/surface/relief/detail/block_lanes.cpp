@@ -12,7 +12,8 @@ namespace {
 #define ASPERITY_INLINE [[gnu::always_inline]] inline
 
 /// The least squared distance to a place that a node of each of some blocks may have.
-ASPERITY_INLINE void bound_all(const std::array<const float*, 8>& block, std::size_t count, const Vec3f& c, float* to) {
+ASPERITY_INLINE void bound_all(const std::array<const float*, block_rows>& block, std::size_t count, const Vec3f& c,
+                               float* to) {
   const float cx = c.x();
   const float cy = c.y();
   const float cz = c.z();
@@ -55,14 +56,14 @@ ASPERITY_INLINE float square_all(const float* __restrict places, const Vec3f& c,
   return all;
 }
 
-void bound_plain(const std::array<const float*, 8>& block, std::size_t count, const Vec3f& c, float* to) {
+void bound_plain(const std::array<const float*, block_rows>& block, std::size_t count, const Vec3f& c, float* to) {
   bound_all(block, count, c, to);
 }
 float square_plain(const float* places, const Vec3f& c, float* to) {
   return square_all(places, c, to);
 }
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void bound_avx2(const std::array<const float*, 8>& block, std::size_t count,
+__attribute__((target("avx2"))) void bound_avx2(const std::array<const float*, block_rows>& block, std::size_t count,
                                                 const Vec3f& c, float* to) {
   bound_all(block, count, c, to);
 }

@@ -16,11 +16,10 @@ constexpr double rest_of_radius = 3e-3;
 constexpr double still_of_radius = 1e-3;
 // A place is settled when its ball is free to this share of the radius.
 constexpr double settled_of_radius = 2e-4;
-// Steps along a tangent are this many times as long as the distance says, at most; a ball that has no rest on a ridge
-// rolls off it by this share of the radius.
+// Steps along a tangent are one over this times as long as the distance says, at most, and no longer than this share of
+// the radius: by which a ball that has no rest on a ridge rolls off it.
 constexpr double least_curvature = 0.04;
-constexpr double roll_of_radius = 0.15;
-constexpr double most_roll_of_radius = 0.1;
+constexpr double roll_of_radius = 0.1;
 // A way along which the height falls by less than this share of the radius is not gone.
 constexpr double gain_of_radius = 2.5e-4;
 constexpr double most_move_of_radius = 0.5;
@@ -306,7 +305,7 @@ BallSolver::Move BallSolver::move_from(const Vec3& centre, const Vec3& held) con
         return move;
       }
       move.rolls = rolls;
-      const double on = std::clamp(newton, -most_roll_of_radius * radius_, most_roll_of_radius * radius_);
+      const double on = std::clamp(newton, -roll_of_radius * radius_, roll_of_radius * radius_);
       move.by += (on - along) * way;
       // The contacts bend away under the way: the ball stays on them, to second order.
       const auto falls = [&](int k) { return 0.5 * on * on / radius_ * bend(contacts_[move.rest.active[k]], way); };

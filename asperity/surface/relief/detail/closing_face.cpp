@@ -280,9 +280,9 @@ void FaceCloser::close_texels(int stride, bool coarsest) {
         const bool between = i + std::abs(di) + j + dj <= texels_ && i + di + j + dj <= texels_;
         // Beside a rim a ball may hold what lies between from below the line through both.
         if (between && !at_rim(texel) && bound(texel, di, dj)) continue;
-        // From the ball that comes lowest of those around.
-        lowest = between ? known(i, j) : Known{nowhere, nowhere, no_index};
-        start = lowest.ball != no_index && std::isfinite(lowest.upper) ? &lowest : &known(i - di, j - dj);
+        // From the ball that comes lowest of those around, where bounds were asked for.
+        lowest = known(i, j);
+        start = lowest.ball != no_index ? &lowest : &known(i - di, j - dj);
       }
       settle_texel(texel, start);
       if (std::isfinite(known(i, j).lower)) last = &known(i, j);

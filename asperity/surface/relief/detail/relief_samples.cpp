@@ -229,18 +229,18 @@ const float* NearSamples::places_of(std::uint32_t chunk) {
 }
 
 void NearSamples::Blocks::clear() {
-  blocks.clear();
+  entries.clear();
   for (auto& row : rows) row.clear();
 }
 
-void NearSamples::Blocks::add(const Block& block, const float (&values)[8]) {
-  blocks.push_back(block);
-  for (std::size_t i = 0; i < 8; ++i) rows[i].push_back(values[i]);
+void NearSamples::Blocks::add(const Entry& entry, const float (&values)[block_rows]) {
+  entries.push_back(entry);
+  for (std::size_t i = 0; i < block_rows; ++i) rows[i].push_back(values[i]);
 }
 
-std::array<const float*, 8> NearSamples::Blocks::columns() const {
-  std::array<const float*, 8> columns;
-  for (std::size_t i = 0; i < 8; ++i) columns[i] = rows[i].data();
+std::array<const float*, block_rows> NearSamples::Blocks::columns() const {
+  std::array<const float*, block_rows> columns;
+  for (std::size_t i = 0; i < block_rows; ++i) columns[i] = rows[i].data();
   return columns;
 }
 
@@ -261,7 +261,7 @@ void NearSamples::gather(const Vec3& centre) {
                                       block.normal.z(), block.top});
     }
   }
-  nearest_.resize(std::max(nearest_.size(), around_.blocks.size()));
+  nearest_.resize(std::max(nearest_.size(), around_.entries.size()));
 }
 
 void NearSamples::list(const Vec3& centre) {
@@ -271,13 +271,13 @@ void NearSamples::list(const Vec3& centre) {
   listed_ = true;
   list_.clear();
   const auto reach = static_cast<float>((bound_ + slack_) * (bound_ + slack_) * (1.0 + 1e-5));
-  const std::array<const float*, 8> columns = around_.columns();
-  bound_blocks(columns, around_.blocks.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
+  const std::array<const float*, block_rows> columns = around_.columns();
+  bound_blocks(columns, around_.entries.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
   std::uint32_t chunk = no_index;
   const float* places = nullptr;
-  for (std::size_t k = 0; k < around_.blocks.size(); ++k) {
+  for (std::size_t k = 0; k < around_.entries.size(); ++k) {
     if (nearest_[k] > reach) continue;
-    Block one = around_.blocks[k];
+    Entry one = around_.entries[k];
     if (one.chunk != chunk) {
       chunk = one.chunk;
       places = places_of(chunk);
@@ -290,12 +290,12 @@ void NearSamples::list(const Vec3& centre) {
 
 NearSamples::Found NearSamples::search(const Vec3& centre, double bound, bool any) {
   if (!listed_ || (centre - listed_at_).squaredNorm() > slack_ * slack_) list(centre);
-  bound_blocks(list_.columns(), list_.blocks.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
+  bound_blocks(list_.columns(), list_.entries.size(), (centre - gathered_at_).cast<float>(), nearest_.data());
   Found found;
   auto best = static_cast<float>(bound * bound);
   in_reach_.clear();
   std::size_t first = 0;
-  for (std::uint32_t k = 0; k < list_.blocks.size(); ++k) {
+  for (std::uint32_t k = 0; k < list_.entries.size(); ++k) {
     if (nearest_[k] >= best) continue;
     if (!in_reach_.empty() && nearest_[k] < nearest_[in_reach_[first]]) first = in_reach_.size();
     in_reach_.push_back(k);
@@ -306,7 +306,7 @@ NearSamples::Found NearSamples::search(const Vec3& centre, double bound, bool an
   float squares[block_nodes];
   for (const std::uint32_t k : in_reach_) {
     if (nearest_[k] >= best) continue;
-    const Block& entry = list_.blocks[k];
+    const Entry& entry = list_.entries[k];
     const ReliefSamples::Chunk& chunk = samples_.chunks()[entry.chunk];
     const float least = square_nodes(entry.places, (centre - chunk.centre).cast<float>(), squares);
     if (least >= best) continue;

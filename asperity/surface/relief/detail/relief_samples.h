@@ -158,18 +158,18 @@ class NearSamples {
   const ReliefSamples& samples_;
   double bound_;
   double slack_;  ///< how far places may lie from where the list was made (m)
-  struct Block {
+  struct Entry {
     std::uint32_t chunk;
     std::uint32_t block;
     const float* places;  ///< of its nodes, in a list alone
   };
   /// Blocks, and each number of theirs in a row of its own: place, radius, normal, top.
   struct Blocks {
-    std::vector<Block> blocks;
-    std::array<std::vector<float>, 8> rows;
+    std::vector<Entry> entries;
+    std::array<std::vector<float>, block_rows> rows;
     void clear();
-    void add(const Block& block, const float (&values)[8]);
-    [[nodiscard]] std::array<const float*, 8> columns() const;
+    void add(const Entry& entry, const float (&values)[block_rows]);
+    [[nodiscard]] std::array<const float*, block_rows> columns() const;
   };
   // Those of the chunks around, their places from where they were gathered.
   Vec3 gathered_at_ = Vec3::Zero();
