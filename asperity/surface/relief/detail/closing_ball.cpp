@@ -369,8 +369,9 @@ double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall&
     const Vec3 reach = centre - held;
     const double away = reach.norm();
     double rise = 0.0;
-    if (!move.rolls && away > 0.0) {
-      const double along = std::max(0.1 * scale, reach.dot(ray.direction) / away);
+    if (!move.rolls) {
+      // A ball around the place that nothing holds there comes down.
+      const double along = away > 0.0 ? std::max(0.1 * scale, reach.dot(ray.direction) / away) : scale;
       rise = std::clamp((away - radius_) / along, -0.5 * radius_, 0.5 * radius_);
       rise = std::max(lowest - height, rise);
       height += rise;
@@ -384,7 +385,8 @@ double BallSolver::settle(const ShellRay& ray, double lowest, const RestingBall&
     }
   }
   // Out of steps: what was reached stands when it is close.
-  if (!is_free(centre, settled_of_radius) || (centre - ray.at(height)).norm() > radius_ * (1.0 + settled_of_radius))
+  if (std::abs((centre - ray.at(height)).norm() - radius_) > settled_of_radius * radius_ ||
+      !is_free(centre, settled_of_radius))
     return not_a_number;
   rest.centre = centre;
   rest.count = 0;
