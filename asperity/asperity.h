@@ -34,6 +34,7 @@
 #include "asperity/geometry/clip.h"
 #include "asperity/geometry/closest_point.h"
 #include "asperity/geometry/contact.h"
+#include "asperity/geometry/corner_uvs.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/geometry/index_table.h"
 #include "asperity/geometry/mesh.h"

@@ -1,7 +1,9 @@
 #include "asperity/geometry/bvh_search.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -13,24 +15,72 @@ namespace {
 
 constexpr std::uint32_t leaf_size = 8;
 constexpr int bin_count = 16;
-// Up to so many triangles every cut that fills leaves is looked at.
-constexpr std::uint32_t counted_one_by_one = 64;
+// Up to so many triangles every cut that fills leaves is looked at; so many fill a node of leaves.
+constexpr std::uint32_t node_of_leaves = 64;
+// Ranges of up to so many are cut into full nodes of leaves.
+constexpr std::uint32_t cut_by_nodes = 512;
 // Below this depth ranges are halved by position whatever the area: it bounds the traversal stack.
 constexpr int balanced_depth = 20;
 // From so far away (in sizes of the mesh) single precision tells no two triangles apart, and its squares leave their
 // range.
 constexpr float far_rounding = 1e5F;
 
-struct Primitive : FloatBox {
-  std::uint32_t face = no_index;
-  [[nodiscard]] float centre(int axis) const { return lower[axis] + upper[axis]; }
+// Three coordinates and a lane that no box reads.
+using FourFloats = float __attribute__((vector_size(16)));
+
+/// A FloatBox whose coordinates are compared side by side.
+struct WideBox {
+  FourFloats lower = {1e30F, 1e30F, 1e30F, 1e30F};
+  FourFloats upper = {-1e30F, -1e30F, -1e30F, -1e30F};
+
+  void include(const FourFloats& low, const FourFloats& high) noexcept {
+    lower = low < lower ? low : lower;
+    upper = high > upper ? high : upper;
+  }
+  void include(const WideBox& other) noexcept { include(other.lower, other.upper); }
+  [[nodiscard]] float area() const noexcept {
+    return FloatBox{{lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}}.area();
+  }
+  [[nodiscard]] int widest_axis() const noexcept {
+    const FourFloats extent = upper - lower;
+    int axis = 0;
+    for (int other = 1; other < 3; ++other) {
+      if (extent[other] > extent[axis]) axis = other;
+    }
+    return axis;
+  }
+};
+
+/// A triangle's box; in the lanes that no box reads its number.
+struct Primitive {
+  FourFloats lower;
+  FourFloats upper;
+
+  Primitive() noexcept = default;
+  Primitive(const FloatBox& box, std::uint32_t face) noexcept
+      : lower{box.lower[0], box.lower[1], box.lower[2], std::bit_cast<float>(face + least_normal)},
+        upper{box.upper[0], box.upper[1], box.upper[2], 0.0F} {}
+  [[nodiscard]] std::uint32_t face() const noexcept { return std::bit_cast<std::uint32_t>(lower[3]) - least_normal; }
+  [[nodiscard]] float centre(int axis) const noexcept { return lower[axis] + upper[axis]; }
+
+ private:
+  // Numbers below it would be denormal floats, with which some processors take their time.
+  static constexpr std::uint32_t least_normal = 0x00800000U;
 };
 
 struct Range {
   std::uint32_t first;
   std::uint32_t last;
-  FloatBox box;
+  WideBox box;
+  WideBox centres;  ///< twice them
   [[nodiscard]] std::uint32_t size() const { return last - first; }
+};
+
+/// What lies between planes across an axis.
+struct Bins {
+  WideBox box[bin_count];
+  WideBox centres[bin_count];
+  std::uint32_t count[bin_count] = {};
 };
 
 }  // namespace
@@ -41,10 +91,8 @@ class Bvh::Builder {
 
   void run() {
     const auto count = static_cast<std::uint32_t>(mesh_.triangles().size());
-    Range all{0, count, take_primitives(count)};
+    const Range all = take_primitives(count);
     Part whole;
-    whole.leaves.reserve(count / 7 + 1);
-    whole.nodes.reserve(count / 40 + 1);
     // The top by one thread, what is below it by all; how it is shared out does not depend on how many they are.
     constexpr std::uint32_t parts = 32;
     constexpr std::uint32_t least_part = 4096;
@@ -53,15 +101,7 @@ class Bvh::Builder {
     std::vector<Part> built(top.parts.size());
     parallel_for(built.size(), {},
                  [&](std::size_t i) { build_node(built[i], top.parts[i].range, top.parts[i].depth, nullptr); });
-    for (std::size_t i = 0; i < built.size(); ++i) {
-      whole.nodes[top.parts[i].parent].child[top.parts[i].place] = append(whole, built[i]);
-      built[i] = {};
-    }
-    bvh_.nodes_ = std::move(whole.nodes);
-    bvh_.leaves_ = std::move(whole.leaves);
-    bvh_.nodes_.shrink_to_fit();
-    bvh_.leaves_.shrink_to_fit();
-    bvh_.cylinders_.resize(bvh_.leaves_.size());
+    join(whole, top, built);
   }
 
  private:
@@ -81,45 +121,61 @@ class Bvh::Builder {
     std::vector<Left> parts;
   };
 
-  /// Answers the box of all.
-  FloatBox take_primitives(std::uint32_t count) {
+  Range take_primitives(std::uint32_t count) {
     primitives_.resize(count);
-    constexpr std::uint32_t share = 16384;
-    std::vector<FloatBox> boxes((count + share - 1) / share);
-    parallel_for(boxes.size(), {}, [&](std::size_t i) {
+    std::vector<Range> ranges((count + share - 1) / share);
+    parallel_for(ranges.size(), {}, [&](std::size_t i) {
       const auto first = static_cast<std::uint32_t>(i) * share;
-      for (std::uint32_t face = first; face < std::min(first + share, count); ++face) {
-        primitives_[face] = primitive(face);
-        boxes[i].include(primitives_[face]);
+      const std::uint32_t last = std::min(first + share, count);
+      for (std::uint32_t face = first; face < last; ++face) {
+        FloatBox box;
+        for (const Vec3& corner : mesh_.corners(face)) {
+          float local[3];
+          bvh_.to_local(corner, local);
+          box.include(local, local);
+        }
+        primitives_[face] = Primitive(box, face);
       }
+      ranges[i] = bounded(first, last);
     });
-    FloatBox all;
-    for (const FloatBox& box : boxes) all.include(box);
+    Range all{0, count, {}, {}};
+    for (const Range& range : ranges) {
+      all.box.include(range.box);
+      all.centres.include(range.centres);
+    }
     return all;
   }
 
-  /// Answers the index that the part's first node has in the whole.
-  static std::uint32_t append(Part& whole, const Part& part) {
-    const auto first_node = static_cast<std::uint32_t>(whole.nodes.size());
-    const auto first_leaf = static_cast<std::uint32_t>(whole.leaves.size());
-    whole.leaves.insert(whole.leaves.end(), part.leaves.begin(), part.leaves.end());
-    for (Node node : part.nodes) {
-      for (std::uint32_t& child : node.child) {
-        if (child != empty_child) child += (child & leaf_bit) != 0 ? first_leaf : first_node;
-      }
-      whole.nodes.push_back(node);
+  /// The parts behind the whole, one after the other.
+  void join(Part& whole, const Top& top, std::vector<Part>& built) {
+    std::size_t nodes = whole.nodes.size();
+    std::size_t leaves = whole.leaves.size();
+    struct At {
+      std::uint32_t node;
+      std::uint32_t leaf;
+    };
+    std::vector<At> at;
+    for (std::size_t i = 0; i < built.size(); ++i) {
+      at.push_back({static_cast<std::uint32_t>(nodes), static_cast<std::uint32_t>(leaves)});
+      whole.nodes[top.parts[i].parent].child[top.parts[i].place] = at[i].node;
+      nodes += built[i].nodes.size();
+      leaves += built[i].leaves.size();
     }
-    return first_node;
-  }
-
-  [[nodiscard]] Primitive primitive(std::uint32_t face) const {
-    Primitive p{{}, face};
-    for (const Vec3& corner : mesh_.corners(face)) {
-      float local[3];
-      bvh_.to_local(corner, local);
-      p.include(local, local);
-    }
-    return p;
+    bvh_.nodes_.resize(nodes);
+    bvh_.leaves_.resize(leaves);
+    bvh_.cylinders_.resize(leaves);
+    std::copy(whole.nodes.begin(), whole.nodes.end(), bvh_.nodes_.begin());
+    std::copy(whole.leaves.begin(), whole.leaves.end(), bvh_.leaves_.begin());
+    parallel_for(built.size(), {}, [&](std::size_t i) {
+      const Part part = std::move(built[i]);
+      std::copy(part.leaves.begin(), part.leaves.end(), bvh_.leaves_.begin() + at[i].leaf);
+      std::transform(part.nodes.begin(), part.nodes.end(), bvh_.nodes_.begin() + at[i].node, [&](Node node) {
+        for (std::uint32_t& child : node.child) {
+          if (child != empty_child) child += (child & leaf_bit) != 0 ? at[i].leaf : at[i].node;
+        }
+        return node;
+      });
+    });
   }
 
   /// With a `top`, ranges of its size are left to it.
@@ -127,10 +183,12 @@ class Bvh::Builder {
     Range children[8];
     int count = 1;
     children[0] = range;
+    // What fills a node of leaves is left whole for one.
+    const std::uint32_t whole = range.size() > node_of_leaves ? node_of_leaves : leaf_size;
     while (count < 8) {
       int widest = -1;
       for (int i = 0; i < count; ++i) {
-        if (children[i].size() <= leaf_size) continue;
+        if (children[i].size() <= whole) continue;
         if (widest < 0 || children[i].box.area() > children[widest].box.area()) widest = i;
       }
       if (widest < 0) break;
@@ -156,26 +214,17 @@ class Bvh::Builder {
   std::uint32_t build_leaf(Part& part, const Range& range) {
     Leaf& leaf = part.leaves.emplace_back();
     for (std::uint32_t i = 0; i < 8; ++i)
-      leaf.face[i] = i < range.size() ? primitives_[range.first + i].face : no_index;
+      leaf.face[i] = i < range.size() ? primitives_[range.first + i].face() : no_index;
     return static_cast<std::uint32_t>(part.leaves.size() - 1) | leaf_bit;
   }
 
   /// Splits `range` in two by the cheapest of bin_count - 1 planes along the widest axis of the centres.
   void split(Range range, int depth, Range& left, Range& right) {
-    FloatBox centres;
-    for (std::uint32_t i = range.first; i < range.last; ++i) {
-      const float centre[3] = {primitives_[i].centre(0), primitives_[i].centre(1), primitives_[i].centre(2)};
-      centres.include(centre, centre);
-    }
-    const auto& [low, high] = centres;
-    int axis = 0;
-    for (int other = 1; other < 3; ++other) {
-      if (high[other] - low[other] > high[axis] - low[axis]) axis = other;
-    }
+    const int axis = range.centres.widest_axis();
     std::uint32_t middle = range.first;
-    if (depth < balanced_depth && high[axis] - low[axis] > 1e-12F) {
-      middle = range.size() <= counted_one_by_one ? cut_by_leaves(range, axis)
-                                                  : partition_by_area(range, axis, low[axis], high[axis]);
+    if (depth < balanced_depth && range.centres.upper[axis] - range.centres.lower[axis] > 1e-12F) {
+      if (range.size() > cut_by_nodes && partition_by_area(range, axis, left, right)) return;
+      middle = range.size() <= node_of_leaves ? cut_by_leaves(range, axis) : cut_near_planes(range, axis);
     }
     if (middle == range.first || middle == range.last) middle = halve(range, axis);
     left = bounded(range.first, middle);
@@ -186,64 +235,121 @@ class Bvh::Builder {
     return static_cast<float>((triangles + leaf_size - 1) / leaf_size);
   }
 
-  std::uint32_t partition_by_area(const Range& range, int axis, float low, float high) {
-    const float to_bin = static_cast<float>(bin_count) * 0.9999F / (high - low);
-    const auto bin_of = [&](const Primitive& p) { return static_cast<int>((p.centre(axis) - low) * to_bin); };
-    FloatBox boxes[bin_count];
-    std::uint32_t counts[bin_count] = {};
-    for (std::uint32_t i = range.first; i < range.last; ++i) {
-      const int bin = bin_of(primitives_[i]);
-      boxes[bin].include(primitives_[i]);
-      ++counts[bin];
+  struct ToBin {
+    int axis;
+    float low;
+    float scale;
+    ToBin(const Range& range, int axis_)
+        : axis(axis_),
+          low(range.centres.lower[axis]),
+          scale(static_cast<float>(bin_count) * 0.9999F / (range.centres.upper[axis] - low)) {}
+    [[nodiscard]] int operator()(const Primitive& p) const { return static_cast<int>((p.centre(axis) - low) * scale); }
+  };
+
+  void bin(std::uint32_t first, std::uint32_t last, const ToBin& to_bin, Bins& bins) const {
+    for (std::uint32_t i = first; i < last; ++i) {
+      const Primitive& p = primitives_[i];
+      const int to = to_bin(p);
+      const FourFloats centre = p.lower + p.upper;
+      bins.box[to].include(p.lower, p.upper);
+      bins.centres[to].include(centre, centre);
+      ++bins.count[to];
     }
+  }
+
+  [[nodiscard]] Bins binned(const Range& range, const ToBin& to_bin) const {
+    Bins all;
+    if (range.size() <= share) {
+      bin(range.first, range.last, to_bin, all);
+      return all;
+    }
+    std::vector<Bins> parts((range.size() + share - 1) / share);
+    parallel_for(parts.size(), {}, [&](std::size_t i) {
+      const std::uint32_t first = range.first + static_cast<std::uint32_t>(i) * share;
+      bin(first, std::min(first + share, range.last), to_bin, parts[i]);
+    });
+    for (const Bins& part : parts) {
+      for (int k = 0; k < bin_count; ++k) {
+        all.box[k].include(part.box[k]);
+        all.centres[k].include(part.centres[k]);
+        all.count[k] += part.count[k];
+      }
+    }
+    return all;
+  }
+
+  /// The last bin on the lower side of the cheapest plane; none: below 0.
+  static int cheapest_cut(const Bins& bins, std::uint32_t size) {
     float right_cost[bin_count] = {};
-    FloatBox sweep;
+    WideBox sweep;
     std::uint32_t sum = 0;
-    for (int bin = bin_count - 1; bin > 0; --bin) {
-      sweep.include(boxes[bin]);
-      sum += counts[bin];
-      right_cost[bin] = sweep.area() * leaves_for(sum);
+    for (int k = bin_count - 1; k > 0; --k) {
+      sweep.include(bins.box[k]);
+      sum += bins.count[k];
+      right_cost[k] = sweep.area() * leaves_for(sum);
     }
     sweep = {};
     sum = 0;
     int best = -1;
     float best_cost = 1e30F;
-    for (int bin = 0; bin + 1 < bin_count; ++bin) {
-      sweep.include(boxes[bin]);
-      sum += counts[bin];
-      const float cost = sweep.area() * leaves_for(sum) + right_cost[bin + 1];
-      if (sum != 0 && sum != range.size() && cost < best_cost) {
+    for (int k = 0; k + 1 < bin_count; ++k) {
+      sweep.include(bins.box[k]);
+      sum += bins.count[k];
+      const float cost = sweep.area() * leaves_for(sum) + right_cost[k + 1];
+      if (sum != 0 && sum != size && cost < best_cost) {
         best_cost = cost;
-        best = bin;
+        best = k;
       }
     }
+    return best;
+  }
+
+  bool partition_by_area(const Range& range, int axis, Range& left, Range& right) {
+    const ToBin to_bin(range, axis);
+    const Bins bins = binned(range, to_bin);
+    const int best = cheapest_cut(bins, range.size());
+    if (best < 0) return false;
+    const auto begin = primitives_.begin();
+    const auto middle = static_cast<std::uint32_t>(
+        std::partition(begin + range.first, begin + range.last, [&](const Primitive& p) { return to_bin(p) <= best; }) -
+        begin);
+    left = {range.first, middle, {}, {}};
+    right = {middle, range.last, {}, {}};
+    for (int k = 0; k < bin_count; ++k) {
+      Range& side = k <= best ? left : right;
+      side.box.include(bins.box[k]);
+      side.centres.include(bins.centres[k]);
+    }
+    return true;
+  }
+
+  /// Cuts near the cheapest plane, where what is on its lower side fills nodes of leaves.
+  std::uint32_t cut_near_planes(const Range& range, int axis) {
+    const Bins bins = binned(range, ToBin(range, axis));
+    const int best = cheapest_cut(bins, range.size());
     if (best < 0) return range.first;
-    const auto first = primitives_.begin() + range.first;
-    const auto last = primitives_.begin() + range.last;
-    const auto middle = std::partition(first, last, [&](const Primitive& p) { return bin_of(p) <= best; });
-    return static_cast<std::uint32_t>(middle - primitives_.begin());
+    const std::uint32_t below = std::accumulate(bins.count, bins.count + best + 1, 0U);
+    const std::uint32_t nodes = (below + node_of_leaves / 2) / node_of_leaves;
+    return cut_at(range, axis,
+                  range.first + node_of_leaves * std::clamp(nodes, 1U, (range.size() - 1) / node_of_leaves));
   }
 
   /// Cuts a small range where both sides fill leaves: what a query looks at are leaves, full or not.
   std::uint32_t cut_by_leaves(const Range& range, int axis) {
     const auto begin = primitives_.begin() + range.first;
-    std::sort(begin, primitives_.begin() + range.last, [axis](const Primitive& a, const Primitive& b) {
-      const float at_a = a.centre(axis);
-      const float at_b = b.centre(axis);
-      return at_a < at_b || (at_a == at_b && a.face < b.face);
-    });
-    constexpr std::uint32_t most_cuts = counted_one_by_one / leaf_size;
+    sort(&*begin, range.size(), axis);
+    constexpr std::uint32_t most_cuts = node_of_leaves / leaf_size;
     float right_cost[most_cuts + 1] = {};
-    FloatBox sweep;
+    WideBox sweep;
     for (std::uint32_t i = range.size(); i-- > leaf_size;) {
-      sweep.include(begin[i]);
+      sweep.include(begin[i].lower, begin[i].upper);
       if (i % leaf_size == 0) right_cost[i / leaf_size] = sweep.area() * leaves_for(range.size() - i);
     }
     sweep = {};
     std::uint32_t best = 0;
     float best_cost = 1e30F;
     for (std::uint32_t i = 0; i + 1 < range.size(); ++i) {
-      sweep.include(begin[i]);
+      sweep.include(begin[i].lower, begin[i].upper);
       if ((i + 1) % leaf_size != 0) continue;
       const std::uint32_t cut = (i + 1) / leaf_size;
       const float cost = sweep.area() * static_cast<float>(cut) + right_cost[cut];
@@ -255,8 +361,24 @@ class Bvh::Builder {
     return range.first + best;
   }
 
-  std::uint32_t halve(const Range& range, int axis) {
-    const std::uint32_t middle = range.first + range.size() / 2;
+  /// By their centres; where those are one they stay in order.
+  static void sort(Primitive* first, std::uint32_t count, int axis) {
+    // Each centre as a number in the same order, its place behind it.
+    std::uint64_t keys[node_of_leaves];
+    Primitive before[node_of_leaves];
+    std::copy(first, first + count, before);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto bits = std::bit_cast<std::uint32_t>(first[i].centre(axis));
+      const std::uint32_t ordered = bits ^ ((bits >> 31U) != 0 ? 0xffffffffU : 0x80000000U);
+      keys[i] = std::uint64_t{ordered} << 32U | i;
+    }
+    std::sort(keys, keys + count);
+    for (std::uint32_t i = 0; i < count; ++i) first[i] = before[keys[i] & 0xffffffffU];
+  }
+
+  std::uint32_t halve(const Range& range, int axis) { return cut_at(range, axis, range.first + range.size() / 2); }
+
+  std::uint32_t cut_at(const Range& range, int axis, std::uint32_t middle) {
     const auto begin = primitives_.begin();
     std::nth_element(begin + range.first, begin + middle, begin + range.last,
                      [axis](const Primitive& a, const Primitive& b) { return a.centre(axis) < b.centre(axis); });
@@ -264,14 +386,21 @@ class Bvh::Builder {
   }
 
   [[nodiscard]] Range bounded(std::uint32_t first, std::uint32_t last) const {
-    Range range{first, last, {}};
-    for (std::uint32_t i = first; i < last; ++i) range.box.include(primitives_[i]);
+    Range range{first, last, {}, {}};
+    for (std::uint32_t i = first; i < last; ++i) {
+      const FourFloats centre = primitives_[i].lower + primitives_[i].upper;
+      range.box.include(primitives_[i].lower, primitives_[i].upper);
+      range.centres.include(centre, centre);
+    }
     return range;
   }
 
+  // Primitives that a thread takes at a time.
+  static constexpr std::uint32_t share = 16384;
+
   const TriangleMesh& mesh_;
   Bvh& bvh_;
-  std::vector<Primitive> primitives_;
+  UnsetVector<Primitive> primitives_;
 };
 
 Bvh Bvh::build(const TriangleMesh& mesh, const BvhSettings& settings) {

@@ -177,9 +177,9 @@ class Bvh {
   double scale_ = 1.0;
   double per_scale_ = 1.0;  ///< 1 / scale_
   double cost_ = 0.0;
-  std::vector<Node> nodes_;  ///< each before its children
-  std::vector<Leaf> leaves_;
-  std::vector<Cylinder> cylinders_;  ///< one around each leaf
+  UnsetVector<Node> nodes_;  ///< each before its children
+  UnsetVector<Leaf> leaves_;
+  UnsetVector<Cylinder> cylinders_;  ///< one around each leaf
 };
 
 inline void Bvh::to_local(const Vec3& p, float local[3]) const noexcept {

@@ -321,7 +321,7 @@ class Displacement {
     std::array<Vec2f, 3>& uvs = uvs_.emplace_back();
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3f b = barycentric(steps[k]).cast<float>();
-      const auto& corners = base_.uvs(face);
+      const std::array<Vec2f, 3> corners = base_.uvs(face);
       uvs[k] = b[0] * corners[0] + b[1] * corners[1] + b[2] * corners[2];
     }
   }

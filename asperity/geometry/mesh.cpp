@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "asperity/core/parallel_for.h"
 #include "asperity/geometry/detail/face_measures.h"
@@ -19,6 +21,8 @@ using Triangle = TriangleMesh::Triangle;
 constexpr double largest_coordinate = 1e60;
 constexpr double smallest_edge = 1e-60;
 constexpr double smallest_relative_area = 1e-12;
+// Vertices or triangles that a thread takes at a time.
+constexpr std::size_t elements_a_share = 8192;
 constexpr std::size_t most_triangles = (std::size_t{1} << 32U) / 3 - 1;  // three 32-bit corner entries each
 
 Error bad_mesh(std::string what, std::string place, std::string accepted) {
@@ -94,10 +98,6 @@ bool degenerate(const Vec3& a, const Vec3& b, const Vec3& c) {
   return 0.5 * (ab / longest_squared).cross(ac).norm() < smallest_relative_area;
 }
 
-std::uint64_t hash_of(const Triangle& sorted) {
-  return mixed_bits(mixed_bits((std::uint64_t{sorted[0]} << 32U) | sorted[1]) + sorted[2]);
-}
-
 Triangle sorted(Triangle triangle) {
   if (triangle[0] > triangle[1]) std::swap(triangle[0], triangle[1]);
   if (triangle[1] > triangle[2]) std::swap(triangle[1], triangle[2]);
@@ -120,26 +120,61 @@ Status remap_triangles(MeshSource& source, const std::vector<std::uint32_t>& mov
   return success();
 }
 
+enum class Verdict : std::uint8_t { kept, degenerate, duplicate };
+
+/// Marks triangles with the same corners as an earlier one.
+void mark_duplicates(const MeshSource& source, std::vector<Verdict>& verdicts) {
+  // Those with the same least corner lie together, ascending.
+  std::vector<std::uint32_t> first(source.positions.size() + 1, 0);
+  const auto least = [&](std::size_t face) {
+    const Triangle& t = source.triangles[face];
+    return std::min({t[0], t[1], t[2]});
+  };
+  for (std::size_t face = 0; face < verdicts.size(); ++face) {
+    if (verdicts[face] == Verdict::kept) ++first[least(face)];
+  }
+  std::uint32_t sum = 0;
+  for (std::uint32_t& start : first) start = std::exchange(sum, sum + start);
+  std::vector<std::uint32_t> faces(sum);
+  for (std::size_t face = 0; face < verdicts.size(); ++face) {
+    if (verdicts[face] == Verdict::kept) faces[first[least(face)]++] = static_cast<std::uint32_t>(face);
+  }
+  // Filling has moved each start to the next one's.
+  parallel_for(source.positions.size(), {.grain = elements_a_share}, [&](std::size_t vertex) {
+    const std::span<std::uint32_t> around(faces.data() + (vertex == 0 ? 0 : first[vertex - 1]),
+                                          faces.data() + first[vertex]);
+    constexpr std::size_t few = 16;
+    if (around.size() > few) {
+      std::sort(around.begin(), around.end(), [&](std::uint32_t one, std::uint32_t other) {
+        const Triangle a = sorted(source.triangles[one]);
+        const Triangle b = sorted(source.triangles[other]);
+        return a < b || (a == b && one < other);
+      });
+    }
+    for (std::size_t i = 1; i < around.size(); ++i) {
+      const Triangle key = sorted(source.triangles[around[i]]);
+      for (std::size_t k = around.size() > few ? i - 1 : 0; k < i; ++k) {
+        if (sorted(source.triangles[around[k]]) == key) verdicts[around[i]] = Verdict::duplicate;
+      }
+    }
+  });
+}
+
 /// Removes triangles without area and repeated ones, keeping order and UVs aligned.
 void drop_unusable_triangles(MeshSource& source, MeshReport& report) {
-  IndexTable table(source.triangles.size());
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < source.triangles.size(); ++i) {
-    const Triangle triangle = source.triangles[i];
+  std::vector<Verdict> verdicts(source.triangles.size(), Verdict::kept);
+  parallel_for(verdicts.size(), {.grain = elements_a_share}, [&](std::size_t face) {
+    const auto& [a, b, c] = source.triangles[face];
     const auto& p = source.positions;
-    if (degenerate(p[triangle[0]], p[triangle[1]], p[triangle[2]])) {
-      ++report.dropped_degenerate;
-      continue;
-    }
-    const Triangle key = sorted(triangle);
-    const std::uint32_t same =
-        table.find_or_insert(hash_of(key), static_cast<std::uint32_t>(kept),
-                             [&](std::uint32_t other) { return sorted(source.triangles[other]) == key; });
-    if (same != no_index) {
-      ++report.dropped_duplicate;
-      continue;
-    }
-    source.triangles[kept] = triangle;
+    if (degenerate(p[a], p[b], p[c])) verdicts[face] = Verdict::degenerate;
+  });
+  mark_duplicates(source, verdicts);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    if (verdicts[i] == Verdict::degenerate) ++report.dropped_degenerate;
+    if (verdicts[i] == Verdict::duplicate) ++report.dropped_duplicate;
+    if (verdicts[i] != Verdict::kept) continue;
+    source.triangles[kept] = source.triangles[i];
     if (!source.corner_uvs.empty()) source.corner_uvs[kept] = source.corner_uvs[i];
     ++kept;
   }
@@ -247,14 +282,28 @@ std::uint64_t fingerprint_of(std::span<const Vec3> positions, std::span<const Tr
 /// there is several times faster than one sort over all edges.
 class TriangleMesh::EdgeSurvey {
  public:
-  EdgeSurvey(const TriangleMesh& mesh, MeshReport& report, std::vector<OddEdge>& odd)
-      : mesh_(mesh), report_(report), odd_(odd) {}
-
-  void run() {
-    for (std::uint32_t vertex = 0; vertex < mesh_.positions().size(); ++vertex) survey(vertex);
+  /// What is counted into `report` and listed in `odd` does not depend on how many threads there are.
+  static void run(const TriangleMesh& mesh, MeshReport& report, std::vector<OddEdge>& odd) {
+    const std::size_t vertices = mesh.positions().size();
+    std::vector<EdgeSurvey> shares((vertices + elements_a_share - 1) / elements_a_share, EdgeSurvey(mesh));
+    parallel_for(shares.size(), {}, [&](std::size_t i) {
+      const std::size_t last = std::min(vertices, (i + 1) * elements_a_share);
+      for (std::size_t vertex = i * elements_a_share; vertex < last; ++vertex)
+        shares[i].survey(static_cast<std::uint32_t>(vertex));
+    });
+    for (const EdgeSurvey& share : shares) {
+      report.boundary_edges += share.report_.boundary_edges;
+      report.nonmanifold_edges += share.report_.nonmanifold_edges;
+      report.misoriented_edges += share.report_.misoriented_edges;
+      report.nonmanifold_vertices += share.report_.nonmanifold_vertices;
+      odd.insert(odd.end(), share.odd_.begin(), share.odd_.end());
+    }
+    odd.shrink_to_fit();
   }
 
  private:
+  explicit EdgeSurvey(const TriangleMesh& mesh) : mesh_(mesh) {}
+
   /// One triangle's use of the edge between the surveyed vertex and `other`.
   struct Use {
     std::uint32_t other;
@@ -295,8 +344,8 @@ class TriangleMesh::EdgeSurvey {
   }
 
   const TriangleMesh& mesh_;
-  MeshReport& report_;
-  std::vector<OddEdge>& odd_;
+  MeshReport report_;
+  std::vector<OddEdge> odd_;
   std::vector<Use> uses_;
   std::vector<std::uint32_t> parents_;
 };
@@ -327,32 +376,35 @@ void TriangleMesh::derive(MeshSource source, bool orient_outward) {
   positions_.shrink_to_fit();
   const auto topology = std::make_shared<Topology>();
   topology->triangles = std::move(source.triangles);
-  topology->corner_uvs = std::move(source.corner_uvs);
   topology->notes = std::move(source.notes);
   topology->triangles.shrink_to_fit();
-  topology->corner_uvs.shrink_to_fit();
   list_faces_of_vertices(positions_.size(), topology->triangles, topology->vertex_offsets, topology->vertex_faces);
   topology_ = topology;
   triangles_ = topology->triangles;
-  corner_uvs_ = topology->corner_uvs.empty() ? nullptr : topology->corner_uvs.data();
   vertex_offsets_ = topology->vertex_offsets.data();
   vertex_faces_ = topology->vertex_faces.data();
 
   report_.vertices = positions_.size();
   report_.triangles = triangles_.size();
   for (const Vec3& position : positions_) bounds_.include(position);
-  EdgeSurvey(*this, report_, topology->odd_edges).run();
-  topology->odd_edges.shrink_to_fit();
+  EdgeSurvey::run(*this, report_, topology->odd_edges);
   report_.components = count_components(positions_.size(), topology->triangles);
   std::vector<Vec3> sums;
   static_cast<void>(measure_faces(sums));
   if (orient_outward && report_.closed() && report_.oriented() && report_.signed_volume < 0.0) {
     for (Triangle& t : topology->triangles) std::swap(t[1], t[2]);
-    for (auto& uvs : topology->corner_uvs) std::swap(uvs[1], uvs[2]);
+    for (auto& uvs : source.corner_uvs) std::swap(uvs[1], uvs[2]);
     static_cast<void>(measure_faces(sums));
     topology->notes.emplace_back("normals pointed inward: all triangles were flipped");
   }
-  topology->fingerprint = fingerprint_of(positions_, topology->triangles, topology->corner_uvs);
+  parallel_for(2, {}, [&](std::size_t task) {
+    if (task == 0) {
+      topology->fingerprint = fingerprint_of(positions_, topology->triangles, source.corner_uvs);
+    } else if (!source.corner_uvs.empty()) {
+      topology->corner_uvs = CornerUvs(source.corner_uvs, topology->triangles, positions_.size());
+    }
+  });
+  if (!topology->corner_uvs.empty()) corner_uvs_ = &topology->corner_uvs;
 }
 
 /// Answers whether some triangle may have lost its area.
@@ -459,7 +511,7 @@ std::size_t TriangleMesh::memory_bytes() const noexcept {
   if (topology_ == nullptr) return bytes;
   bytes += sizeof(Topology);
   add(topology_->triangles);
-  add(topology_->corner_uvs);
+  bytes += topology_->corner_uvs.memory_bytes();
   add(topology_->vertex_offsets);
   add(topology_->vertex_faces);
   add(topology_->odd_edges);

@@ -11,6 +11,7 @@
 #include "asperity/core/math.h"
 #include "asperity/core/result.h"
 #include "asperity/core/unset_vector.h"
+#include "asperity/geometry/corner_uvs.h"
 
 namespace asperity {
 
@@ -75,8 +76,10 @@ class TriangleMesh {
   [[nodiscard]] std::span<const Vec3> positions() const noexcept { return positions_; }
   [[nodiscard]] std::span<const Triangle> triangles() const noexcept { return triangles_; }
   [[nodiscard]] bool has_uvs() const noexcept { return corner_uvs_ != nullptr; }
-  /// Corner UVs of triangle `face`; only when has_uvs().
-  [[nodiscard]] const std::array<Vec2f, 3>& uvs(std::uint32_t face) const noexcept { return corner_uvs_[face]; }
+  /// Corner UVs of triangle `face`; only when has_uvs(). [servo]
+  [[nodiscard]] std::array<Vec2f, 3> uvs(std::uint32_t face) const noexcept {
+    return corner_uvs_->at(face, triangles_[face]);
+  }
   [[nodiscard]] std::array<Vec3, 3> corners(std::uint32_t face) const noexcept {
     const Triangle& t = triangles_[face];
     return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
@@ -127,7 +130,7 @@ class TriangleMesh {
   /// What stays when vertices move.
   struct Topology {
     std::vector<Triangle> triangles;
-    std::vector<std::array<Vec2f, 3>> corner_uvs;
+    CornerUvs corner_uvs;
     std::vector<std::uint32_t> vertex_offsets;
     std::vector<std::uint32_t> vertex_faces;
     std::vector<OddEdge> odd_edges;
@@ -150,7 +153,7 @@ class TriangleMesh {
   std::shared_ptr<const Topology> topology_;
   // Into topology_, so that a query need not go through it.
   std::span<const Triangle> triangles_;
-  const std::array<Vec2f, 3>* corner_uvs_ = nullptr;
+  const CornerUvs* corner_uvs_ = nullptr;
   const std::uint32_t* vertex_offsets_ = nullptr;
   const std::uint32_t* vertex_faces_ = nullptr;
 };

@@ -158,7 +158,10 @@ MeshView::MeshView(const MeshSource& source)
     : positions(source.positions), triangles(source.triangles), corner_uvs(source.corner_uvs) {}
 
 MeshView::MeshView(const TriangleMesh& mesh) : positions(mesh.positions()), triangles(mesh.triangles()) {
-  if (mesh.has_uvs()) corner_uvs = {&mesh.uvs(0), triangles.size()};
+  if (!mesh.has_uvs()) return;
+  own_uvs_.reserve(triangles.size());
+  for (std::uint32_t face = 0; face < triangles.size(); ++face) own_uvs_.push_back(mesh.uvs(face));
+  corner_uvs = own_uvs_;
 }
 
 Status write_obj(const std::filesystem::path& path, const MeshView& mesh) {

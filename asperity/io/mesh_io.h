@@ -36,9 +36,14 @@ Result<MeshSource> read_mesh_bytes(std::string_view bytes, const std::string& na
 struct MeshView {
   MeshView(const MeshSource& source);  // NOLINT: implicit by design
   MeshView(const TriangleMesh& mesh);  // NOLINT
+  MeshView(const MeshView&) = delete;
+  MeshView& operator=(const MeshView&) = delete;
   std::span<const Vec3> positions;
   std::span<const std::array<std::uint32_t, 3>> triangles;
   std::span<const std::array<Vec2f, 3>> corner_uvs;  ///< empty, or one entry a triangle
+
+ private:
+  std::vector<std::array<Vec2f, 3>> own_uvs_;  ///< what a mesh keeps in another form
 };
 
 /// Writes text OBJ: positions exactly, UVs as one `vt` a corner. Errors: file_unwritable. [build] [main]

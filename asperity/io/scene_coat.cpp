@@ -235,7 +235,7 @@ class CoatReader {
 double texture_unit(const TriangleMesh& mesh) {
   double area = 0.0;
   for (std::uint32_t face = 0; mesh.has_uvs() && face < mesh.triangles().size(); ++face) {
-    const auto& uv = mesh.uvs(face);
+    const std::array<Vec2f, 3> uv = mesh.uvs(face);
     const Vec2f a = uv[1] - uv[0];
     const Vec2f b = uv[2] - uv[0];
     area += 0.5 * std::abs(static_cast<double>(a.x()) * static_cast<double>(b.y()) -

@@ -31,7 +31,7 @@ std::array<Vec2, 3> corner_coordinates(const TriangleMesh& mesh, std::uint32_t f
   if (settings.mapping == Mapping::per_face) {
     st = {Vec2(0.0, 0.0), Vec2(1.0, 0.0), Vec2(0.5, 0.5 * std::numbers::sqrt3)};
   } else {
-    const auto& uvs = mesh.uvs(face);
+    const std::array<Vec2f, 3> uvs = mesh.uvs(face);
     for (std::size_t i = 0; i < 3; ++i) st[i] = uvs[i].cast<double>();
   }
   for (Vec2& corner : st) corner = corner.cwiseProduct(settings.repeat);

@@ -171,7 +171,7 @@ MappedPlace FeatureMapping::on_mesh(const TriangleMesh& mesh, std::uint32_t face
   MappedPlace place;
   if (!mesh.has_uvs()) return place;
   const BarycentricFrame frame = barycentric_frame(mesh, face);
-  const auto& corners = mesh.uvs(face);
+  const std::array<Vec2f, 3> corners = mesh.uvs(face);
   const Vec3 from_corner = point - frame.corner;
   place.uv = corners[0].cast<double>();
   for (std::size_t k = 0; k < 3; ++k) {

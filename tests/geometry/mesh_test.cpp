@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <numbers>
 #include <set>
@@ -247,11 +248,87 @@ RC_GTEST_PROP(TriangleMesh, AdjoiningFacesAreVisitedOnce, ()) {
   RC_ASSERT(visited == std::vector<std::uint32_t>(expected.begin(), expected.end()));
 }
 
+RC_GTEST_PROP(TriangleMesh, DropsWhatASetOfCornersSaysIsThereAlready, (std::uint64_t seed)) {
+  Rng rng(seed);
+  MeshSource source;
+  // Few vertices: most triangles repeat another, many of them around one vertex.
+  const std::uint32_t vertices = 3 + rng.below(12);
+  for (std::uint32_t i = 0; i < vertices; ++i)
+    source.positions.emplace_back(rng.uniform(0.0, 1.0), rng.uniform(0.0, 1.0), rng.uniform(0.0, 1.0));
+  const std::uint32_t triangles = 1 + rng.below(300);
+  for (std::uint32_t i = 0; i < triangles; ++i)
+    source.triangles.push_back({rng.below(vertices), rng.below(vertices), rng.below(vertices)});
+  std::set<std::array<std::uint32_t, 3>> there;
+  std::vector<TriangleMesh::Triangle> expected;
+  for (const TriangleMesh::Triangle& triangle : source.triangles) {
+    TriangleMesh::Triangle key = triangle;
+    std::sort(key.begin(), key.end());
+    if (key[0] != key[1] && key[1] != key[2] && there.insert(key).second) expected.push_back(triangle);
+  }
+  RC_PRE(!expected.empty());
+  const MeshSource before = source;
+  const auto mesh = TriangleMesh::build(std::move(source), {.orient_outward = false});
+  RC_ASSERT(mesh.ok());
+  RC_ASSERT(mesh->triangles().size() == expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      RC_ASSERT(mesh->positions()[mesh->triangles()[i][k]] == before.positions[expected[i][k]]);
+  }
+}
+
+RC_GTEST_PROP(TriangleMesh, KeepsEveryCornersUvsToTheBit, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const TriangleMesh plain = built(test::mesh_of_kind(static_cast<int>(rng.below(test::kinds_of_mesh)), seed % 100));
+  MeshSource source;
+  source.positions.assign(plain.positions().begin(), plain.positions().end());
+  source.triangles.assign(plain.triangles().begin(), plain.triangles().end());
+  const auto any = [&] {
+    const auto one = [&] { return rng.below(8) == 0 ? -0.0F : static_cast<float>(rng.uniform(-2.0, 2.0)); };
+    return Vec2f(one(), one());
+  };
+  std::vector<Vec2f> of_vertex;
+  for (std::size_t i = 0; i < source.positions.size(); ++i) of_vertex.push_back(any());
+  // One a vertex, with seams of their own, or of a few for all; all of a few; none like another.
+  const std::uint32_t kind = rng.below(5);
+  std::vector<std::array<Vec2f, 3>> few(1 + rng.below(400));
+  for (auto& corners : few) corners = {any(), any(), any()};
+  for (const TriangleMesh::Triangle& t : source.triangles) {
+    const std::uint32_t number = rng.below(static_cast<std::uint32_t>(few.size()));
+    const bool seam = kind > 0 && rng.below(kind > 2 ? 1 : 6) == 0;
+    auto& corners = source.corner_uvs.emplace_back();
+    if (!seam) corners = {of_vertex[t[0]], of_vertex[t[1]], of_vertex[t[2]]};
+    if (seam) corners = kind % 2 == 0 ? few[number] : std::array<Vec2f, 3>{any(), any(), any()};
+  }
+  const std::vector<std::array<Vec2f, 3>> given = source.corner_uvs;
+  const auto mesh = TriangleMesh::build(std::move(source), {.orient_outward = false});
+  RC_ASSERT(mesh.ok() && mesh->triangles().size() == given.size());
+  for (std::uint32_t face = 0; face < given.size(); ++face) {
+    const std::array<Vec2f, 3> kept = mesh->uvs(face);
+    RC_ASSERT(std::memcmp(kept.data(), given[face].data(), sizeof(kept)) == 0);
+  }
+}
+
 TEST(TriangleMesh, MemoryStaysSmall) {
   MeshSource source = icosphere(5, 1.0);
-  source.corner_uvs.clear();
-  const TriangleMesh mesh = built(std::move(source));
-  EXPECT_LT(mesh.memory_bytes(), 46 * mesh.triangles().size());
+  MeshSource without = source;
+  without.corner_uvs.clear();
+  const TriangleMesh bare = built(std::move(without));
+  const auto triangles = static_cast<double>(bare.triangles().size());
+  EXPECT_LT(static_cast<double>(bare.memory_bytes()), 46.0 * triangles);
+  // Every triangle wears the whole map: one set of corners for all.
+  EXPECT_LT(static_cast<double>(built(source).memory_bytes()), 47.0 * triangles);
+  // One a vertex.
+  for (std::size_t face = 0; face < source.triangles.size(); ++face) {
+    for (std::size_t k = 0; k < 3; ++k)
+      source.corner_uvs[face][k] = source.positions[source.triangles[face][k]].head<2>().cast<float>();
+  }
+  EXPECT_LT(static_cast<double>(built(source).memory_bytes()), 49.0 * triangles);
+  // None like another.
+  Rng rng(1);
+  for (auto& corners : source.corner_uvs) {
+    for (Vec2f& uv : corners) uv = {static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform())};
+  }
+  EXPECT_LT(static_cast<double>(built(source).memory_bytes()), 69.0 * triangles);
 }
 
 TEST(MeshFingerprint, TellsMeshesApartByWhatTheyWereBuiltFrom) {
