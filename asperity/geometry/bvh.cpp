@@ -478,11 +478,9 @@ FirstHit Bvh::first_hit(const Segment& segment) const noexcept {
   FirstHit first;
   for_each_along(segment, 0.0, [&](std::uint32_t face) {
     const auto corners = mesh_->corners(face);
-    double t = 0.0;
-    if (segment_triangle_intersection(segment, corners[0], corners[1], corners[2], t) &&
-        (t < first.t || first.face == no_index)) {
-      first = {face, t};
-    }
+    FirstHit hit{face};
+    if (segment_triangle_intersection(segment, corners[0], corners[1], corners[2], hit.t) && hit.before(first))
+      first = hit;
     return first.face == no_index ? 1.0 : first.t;
   });
   return first;

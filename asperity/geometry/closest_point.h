@@ -72,6 +72,10 @@ struct ClosestHit {
 struct FirstHit {
   std::uint32_t face = no_index;
   double t = 1.0;  ///< along the segment: 0 at `from`, 1 at `to`
+  /// Of two as far along the lower number counts, in whatever order they come.
+  [[nodiscard]] bool before(const FirstHit& other) const noexcept {
+    return t < other.t || (t == other.t && face < other.face);
+  }
 };
 
 /// On which side of the edge from `a` to `b` the line through the origin along `direction` passes: the sign, with the

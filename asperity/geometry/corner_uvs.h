@@ -24,7 +24,7 @@ class CornerUvs {
 
   [[nodiscard]] bool empty() const noexcept { return apart_.empty(); }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return of_vertex_.capacity() * sizeof(Vec2f) + apart_.capacity() * sizeof(Apart) +
+    return of_vertex_.capacity() * sizeof(Vec2f) + apart_.capacity() * sizeof(Apart) + which_.capacity() +
            own_.capacity() * sizeof(Corners);
   }
   /// Of triangle `face`, whose corners are at the vertices of `triangle`. [servo]

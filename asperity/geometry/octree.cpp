@@ -143,9 +143,8 @@ FirstHit TriangleOctree::first_hit(const Segment& segment) const noexcept {
       entry, [&](double key) { return !(key <= 1.0 && key * (1.0 - rounding_of_magnitude) <= best.t); },
       [&](std::uint32_t face) {
         const auto [a, b, c] = mesh_->corners(face);
-        double t = 1.0;
-        if (!segment_triangle_intersection(segment, a, b, c, t)) return;
-        if (t < best.t || best.face == no_index) best = {face, t};
+        FirstHit hit{face};
+        if (segment_triangle_intersection(segment, a, b, c, hit.t) && hit.before(best)) best = hit;
       });
   return best;
 }

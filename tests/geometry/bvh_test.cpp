@@ -12,6 +12,7 @@
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
+#include "asperity/geometry/mesh_refitter.h"
 #include "asperity/geometry/triangle_index.h"
 #include "tests/geometry/random_meshes.h"
 
@@ -400,6 +401,48 @@ TEST(TriangleIndex, NoAnswerDependsOnWhatAPatchHolds) {
   }
   EXPECT_GT(hits, 1000);
   EXPECT_GT(several, 1000);
+}
+
+/// The same triangles at the same places in a tree that was cut for a squeezed mesh.
+TriangleIndex otherwise_cut(const TriangleMesh& mesh, SearchStructure structure) {
+  std::vector<Vec3> squeezed;
+  for (const Vec3& p : mesh.positions()) squeezed.emplace_back(0.2 * p.x() + 0.3 * p.z(), 3.0 * p.y(), p.z());
+  MeshRefitter refitter(TriangleIndex::build(mesh.moved(squeezed).value(), structure));
+  return refitter.moved(mesh.positions()).value();
+}
+
+// A tree is a way to find things: which triangle an answer names where several are as near is not its to say.
+TEST(TriangleIndex, NoAnswerDependsOnHowTheTreeIsCut) {
+  Rng rng(23);
+  std::vector<TriangleMesh> all = meshes();
+  all.push_back(TriangleMesh::build(icosphere(4, 0.05)).value());
+  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  int hits = 0;
+  for (const TriangleMesh& mesh : all) {
+    const TriangleIndex indices[] = {TriangleIndex::build(mesh), otherwise_cut(mesh, SearchStructure::bvh),
+                                     TriangleIndex::build(mesh, SearchStructure::octree)};
+    const double edge = mesh.mean_edge();
+    for (int i = 0; i < 300; ++i) {
+      // Corners and edges for the most part.
+      const Vec3 p = place_on(rng, mesh, 0.0);
+      const Vec3 way = edge * random_unit(rng);
+      const Segment through{p - way, p + way};
+      const FirstHit hit = indices[0].first_hit(through);
+      const std::string nearest = told(indices[0].closest(p, infinity));
+      TrianglePatch patches[3];
+      const std::string swept = told(indices[0].sweep(through, 0.0, Sides::both, patches[0]));
+      for (int other = 1; other < 3; ++other) {
+        const FirstHit again = indices[other].first_hit(through);
+        EXPECT_EQ(again.face, hit.face) << other << ", t " << again.t << " and " << hit.t;
+        EXPECT_EQ(again.t, hit.t);
+        EXPECT_EQ(told(indices[other].closest(p, infinity)), nearest);
+        EXPECT_EQ(told(indices[other].sweep(through, 0.0, Sides::both, patches[other])), swept);
+      }
+      hits += hit.face == no_index ? 0 : 1;
+      ASSERT_FALSE(testing::Test::HasFailure()) << mesh.triangles().size() << " triangles, " << i;
+    }
+  }
+  EXPECT_GT(hits, 500);
 }
 
 // What a search leaves out is not met: a motion that ends on a corner or an edge comes near it at its end alone, which

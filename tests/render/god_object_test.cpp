@@ -7,6 +7,7 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
+#include "asperity/geometry/mesh_refitter.h"
 #include "asperity/render/step.h"
 
 namespace asperity::god_object_test {
@@ -143,6 +144,43 @@ TEST(GodObject, HalfAMillionPokesAndSlidesOfABallNeverPassNorStick) {
   EXPECT_EQ(tally.stuck, 0) << "worst ratio " << tally.worst_ratio;
   // A ball balanced on the very edge above its goal may need more moves than a tick has; it says so and stays outside.
   EXPECT_LE(tally.unconverged, tally.ticks / 100000);
+}
+
+// Which triangles lie together in the tree is no part of what is felt: sheets that cross one another, whose faces ask
+// all the time what is near them, told by two trees.
+TEST(GodObject, ForcesDoNotDependOnHowTheTreeIsCut) {
+  Rng rng(29);
+  int touching = 0;
+  for (int m = 0; m < 12; ++m) {
+    MeshSource source = random_closed_mesh(rng.next(), 3, 0.05, 0.2);
+    for (int more = 0; more < 2; ++more) {
+      const MeshSource other = random_closed_mesh(rng.next(), 3, 0.05, 0.2);
+      const auto first = static_cast<std::uint32_t>(source.positions.size());
+      const Vec3 aside = 0.01 * random_direction(rng);
+      for (const Vec3& p : other.positions) source.positions.emplace_back(p + aside);
+      for (const auto& [a, b, c] : other.triangles) source.triangles.push_back({first + a, first + b, first + c});
+    }
+    source.corner_uvs.clear();
+    const TriangleMesh mesh = TriangleMesh::build(std::move(source)).value();
+    std::vector<Vec3> squeezed;
+    for (const Vec3& p : mesh.positions()) squeezed.emplace_back(0.2 * p.x() + 0.3 * p.z(), 3.0 * p.y(), p.z());
+    MeshRefitter refitter(TriangleIndex::build(mesh.moved(squeezed).value()));
+    const Scene scenes[] = {
+        scene_of(std::make_shared<const MeshSurface>(TriangleIndex::build(mesh)), 0.0),
+        scene_of(std::make_shared<const MeshSurface>(refitter.moved(mesh.positions()).value()), 0.0)};
+    ProxyState states[2];
+    Vec3 probe = 0.1 * random_direction(rng);
+    Vec3 heading = -probe.normalized();
+    for (int i = 0; i < 4000; ++i) {
+      if (rng.below(30) == 0)
+        heading = (random_direction(rng) - 20.0 * (probe.norm() - 0.05) * probe.normalized()).normalized();
+      probe += 2e-4 * heading;
+      const Vec3 force = step(scenes[0], states[0], at(probe), tick).wrench.force;
+      touching += force.isZero(0.0) ? 0 : 1;
+      ASSERT_EQ(step(scenes[1], states[1], at(probe), tick).wrench.force, force) << "mesh " << m << ", tick " << i;
+    }
+  }
+  EXPECT_GT(touching, 10000);
 }
 
 // Any motion at all: jumps across the object, at any speed, must leave the proxy outside.

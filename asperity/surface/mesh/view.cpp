@@ -33,11 +33,21 @@ bool beyond(const std::array<Vec3, 3>& corners, const Vec3& point, const Vec3& o
   return least > margin;
 }
 
+/// Whether the boxes of two triangles keep off each other by more than `margin` (m).
+bool boxes_apart(const std::array<Vec3, 3>& one, const std::array<Vec3, 3>& other, double margin) noexcept {
+  Box around_one;
+  Box around_other;
+  for (const Vec3& corner : one) around_one.include(corner);
+  for (const Vec3& corner : other) around_other.include(corner);
+  return !around_one.grown(margin).overlaps(around_other);
+}
+
 /// Whether a triangle lies wholly beyond a face's plane, beyond one of its edges, or has the face wholly beyond its own
-/// plane.
+/// plane, or keeps off its box: which of those farther off are asked is up to the tree.
 bool apart(const TriangleMesh& mesh, const FlatFrame& frame, const std::array<Vec3, 3>& own, std::uint32_t face,
            double margin) noexcept {
   const std::array<Vec3, 3> other = mesh.corners(face);
+  if (boxes_apart(own, other, margin)) return true;
   if (beyond(other, own[0], frame.front, margin) || beyond(other, own[0], -frame.front, margin)) return true;
   for (std::size_t k = 0; k < 3; ++k) {
     if (beyond(other, own[k], (own[(k + 1) % 3] - own[k]).cross(frame.front).normalized(), margin)) return true;
