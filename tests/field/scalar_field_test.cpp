@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "asperity/field/volume/cubic_kernels.h"
 #include "tests/field/volumes.h"
 
 namespace asperity::test::scalar_field_test {
@@ -108,6 +109,95 @@ TEST_P(EachReconstruction, T8_gradient_and_hessian_are_those_of_the_value) {
       const Vec3 change = (cell.gradient(up).gradient - cell.gradient(down).gradient) / (2.0 * step);
       EXPECT_TRUE((change - jet.hessian.col(a)).norm() < 1e-5 * (1.0 + jet.hessian.norm()));
     }
+  }
+}
+
+/// Value and derivatives by Bernstein's form as it is written, in extended precision.
+long double written_out(const CellPolynomial& cell, const Vec3& p, const std::array<int, 3>& derivatives) {
+  const auto basis = [&](int degree, int i, long double u) {
+    if (i < 0 || i > degree) return 0.0L;
+    long double choose = 1.0L;
+    for (int k = 0; k < i; ++k) choose = choose * (degree - k) / (k + 1);
+    return choose * std::pow(u, static_cast<long double>(i)) * std::pow(1.0L - u, static_cast<long double>(degree - i));
+  };
+  const auto derived = [&](const auto& self, int degree, int i, long double u, int order) -> long double {
+    if (order == 0) return basis(degree, i, u);
+    return degree * (self(self, degree - 1, i - 1, u, order - 1) - self(self, degree - 1, i, u, order - 1));
+  };
+  const int n = cell.degree + 1;
+  long double sum = 0.0L;
+  for (int at = 0; at < n * n * n; ++at) {
+    const int of[3] = {at % n, at / n % n, at / n / n};
+    long double term = cell.coefficient[at];
+    for (int a = 0; a < 3; ++a) {
+      const int order = derivatives[static_cast<std::size_t>(a)];
+      const long double width = cell.width[a];
+      term *= derived(derived, cell.degree, of[a], (p[a] - static_cast<long double>(cell.lower[a])) / width, order) /
+              std::pow(width, static_cast<long double>(order));
+    }
+    sum += term;
+  }
+  return sum;
+}
+
+TEST_P(EachReconstruction, JetsAreBernsteinsFormAsItIsWritten) {
+  std::mt19937_64 generator(19);
+  for (const std::uint64_t seed : {4U, 5U}) {
+    const auto field = random_field(6, GetParam(), seed, 0.8);
+    CellPolynomial cell;
+    for (int n = 0; n < 300; ++n) {
+      ASSERT_TRUE(field->load(0, field->cell_of(0, random_point(generator, 0.05)), cell));
+      const Vec3 p = cell.lower + (random_point(generator, 0.6).array() + 0.5).matrix().cwiseProduct(cell.width);
+      const FieldJet jet = cell.jet(p);
+      const FieldJet first = cell.gradient(p);
+      const double per = 1.0 / cell.width.minCoeff();
+      EXPECT_NEAR(jet.value, static_cast<double>(written_out(cell, p, {0, 0, 0})), 1e-13);
+      EXPECT_EQ(first.value, jet.value);
+      EXPECT_EQ(first.hessian, Mat3::Zero());
+      for (int a = 0; a < 3; ++a) {
+        std::array<int, 3> along{};
+        ++along[static_cast<std::size_t>(a)];
+        EXPECT_NEAR(jet.gradient[a], static_cast<double>(written_out(cell, p, along)), 1e-13 * per);
+        EXPECT_EQ(first.gradient[a], jet.gradient[a]);
+        for (int b = 0; b < 3; ++b) {
+          std::array<int, 3> both = along;
+          ++both[static_cast<std::size_t>(b)];
+          EXPECT_NEAR(jet.hessian(a, b), static_cast<double>(written_out(cell, p, both)), 1e-12 * per * per);
+        }
+      }
+    }
+  }
+}
+
+TEST(SmoothField, WideAndPlainKernelsAgree) {
+  std::mt19937_64 generator(29);
+  const CubicKernels plain = plain_cubic_kernels();
+  const auto field = random_field(6, CellReconstruction::smooth, 6, 0.8);
+  CellPolynomial cell;
+  for (int n = 0; n < 1000; ++n) {
+    ASSERT_TRUE(field->load(0, field->cell_of(0, random_point(generator, 0.05)), cell));
+    const Vec3 p = cell.lower + (random_point(generator, 0.6).array() + 0.5).matrix().cwiseProduct(cell.width);
+    const double per = 1.0 / cell.width.minCoeff();
+    FieldJet jet;
+    FieldJet first;
+    plain.jet(cell, p, jet);
+    plain.gradient(cell, p, first);
+    const FieldJet wide = cell.jet(p);
+    EXPECT_NEAR(jet.value, wide.value, 1e-14);
+    EXPECT_LT((jet.gradient - wide.gradient).norm(), 1e-14 * per);
+    EXPECT_LT((jet.hessian - wide.hessian).norm(), 1e-13 * per * per);
+    EXPECT_NEAR(first.value, jet.value, 1e-14);
+    EXPECT_LT((first.gradient - jet.gradient).norm(), 1e-14 * per);
+    EXPECT_NEAR(plain.value(cell, p), cell.value(p), 1e-14);
+    CellPolynomial::Places places;
+    for (std::size_t a = 0; a < 3; ++a) places[a].fill(p[static_cast<int>(a)]);
+    Lanes values;
+    plain.values(cell, places, values);
+    for (const double value : values) EXPECT_NEAR(value, jet.value, 1e-13);
+    CellRanges ranges;
+    plain.ranges(cell.coefficient, ranges);
+    EXPECT_EQ(ranges.low, cell.low());
+    EXPECT_EQ(ranges.high, cell.high());
   }
 }
 

@@ -80,6 +80,36 @@ TEST(SparseGrid, NodeGradientsAreCentreDifferencesInterpolated) {
   }
 }
 
+TEST(SparseGrid, ClearGradientWeighsNodesByTheEighthPowerOfTheirSlopes) {
+  const auto grid = wavy();
+  std::mt19937_64 generator(3);
+  SparseHint hint;
+  double farthest = 0.0;
+  for (int n = 0; n < 2000; ++n) {
+    const Vec3 p = random_point(generator, 0.03);
+    const auto difference = [&](const Vec3& q) {
+      Vec3 slope;
+      for (int a = 0; a < 3; ++a) {
+        const Vec3 step = voxel * Vec3::Unit(a);
+        slope[a] = (wave(q + step) - wave(q - step)) / (2 * voxel);
+      }
+      return slope;
+    };
+    const auto weight = [&](const Vec3& q) { return std::pow(difference(q).norm(), 8.0); };
+    Vec3 expected;
+    for (int a = 0; a < 3; ++a) {
+      const auto weighed = [&](const Vec3& q) { return weight(q) * difference(q)[a]; };
+      expected[a] = oracle(weighed, p) / oracle(weight, p);
+    }
+    const Vec3 clear = grid->clear_gradient(p, hint);
+    EXPECT_LT((clear - expected).norm(), 1e-4 * expected.norm());
+    farthest = std::max(farthest, (clear - grid->node_gradients(p, hint).gradient).norm() / expected.norm());
+  }
+  // Not the mean by another name.
+  EXPECT_GT(farthest, 0.01);
+  EXPECT_EQ(grid->clear_gradient(Vec3::Constant(100.0), hint), Vec3::Zero());
+}
+
 TEST(SparseGrid, BeyondTheBandLiesASideOfItsOwn) {
   const auto grid = test::sparse_ball(voxel, 0.004);
   SparseHint hint;

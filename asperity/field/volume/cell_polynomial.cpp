@@ -1,4 +1,4 @@
-#include "asperity/field/volume/cell_polynomial.h"
+#include "asperity/field/volume/cubic_kernels.h"
 
 #include <algorithm>
 #include <array>
@@ -7,230 +7,41 @@
 #include <cstring>
 #include <limits>
 
-#if defined(__GNUC__) && defined(__x86_64__)
-// The same code once more for processors with wider registers.
-#define ASPERITY_WIDE 1
-#define ASPERITY_INLINE [[gnu::always_inline]] inline
-#else
-#define ASPERITY_INLINE inline
-#endif
-
 namespace asperity {
 
 namespace {
 
 using Places = CellPolynomial::Places;
-using FourLanes = double __attribute__((vector_size(lanes * sizeof(double))));
-
-/// At one place, or at four side by side.
-template <int Degree, class Number>
-struct Basis {
-  Number value[std::size_t{Degree} + 1];
-  Number slope[std::size_t{Degree} + 1];
-  Number bend[std::size_t{Degree} + 1];
-};
-
-/// Bernstein polynomials at u and their derivatives up to `Order`.
-template <int Degree, int Order, class Number>
-ASPERITY_INLINE void bernstein(const Number& u, double scale, Basis<Degree, Number>& b) noexcept {
-  const Number w = 1.0 - u;
-  if constexpr (Degree == 1) {
-    b.value[0] = w;
-    b.value[1] = u;
-    if constexpr (Order >= 1) {
-      b.slope[0] = -scale;
-      b.slope[1] = scale;
-    }
-    if constexpr (Order >= 2) b.bend[0] = b.bend[1] = 0.0;
-  } else {
-    b.value[0] = w * w * w;
-    b.value[1] = 3.0 * u * w * w;
-    b.value[2] = 3.0 * u * u * w;
-    b.value[3] = u * u * u;
-    if constexpr (Order >= 1) {
-      const double s = 3.0 * scale;
-      b.slope[0] = -s * w * w;
-      b.slope[1] = s * w * (w - 2.0 * u);
-      b.slope[2] = s * u * (2.0 * w - u);
-      b.slope[3] = s * u * u;
-    }
-    if constexpr (Order >= 2) {
-      const double s = 6.0 * scale * scale;
-      b.bend[0] = s * w;
-      b.bend[1] = s * (u - 2.0 * w);
-      b.bend[2] = s * (w - 2.0 * u);
-      b.bend[3] = s * u;
-    }
+/// Of a trilinear cell: what it is along x, y and z, one after the other.
+template <int Order>
+FieldJet linear_jet(const CellPolynomial& cell, const Vec3& p) noexcept {
+  const double* c = cell.coefficient;
+  const Vec3 u = (p - cell.lower).cwiseProduct(cell.per_width);
+  const Vec3 w = Vec3::Ones() - u;
+  double low[4];  // along z
+  double step[4];
+  for (int i = 0; i < 4; ++i) {
+    low[i] = w.z() * c[i] + u.z() * c[4 + i];
+    step[i] = c[4 + i] - c[i];
   }
-}
-
-/// out[0 … Count) = sum over k of weights[k] * in[Count k …): the slowest index first, so that the sums run over
-/// neighbours in memory.
-template <int Degree, int Count, class In, class Number>
-ASPERITY_INLINE void contract(const In* in, const Number* weights, Number* out) noexcept {
-  for (int i = 0; i < Count; ++i) out[i] = weights[0] * in[i];
-  for (int k = 1; k <= Degree; ++k) {
-    for (int i = 0; i < Count; ++i) out[i] += weights[k] * in[Count * k + i];
-  }
-}
-
-template <int Count>
-ASPERITY_INLINE double along_x(const double* in, const double* weights) noexcept {
-  double sum = 0.0;
-  for (int i = 0; i < Count; ++i) sum += weights[i] * in[i];
-  return sum;
-}
-
-template <int Degree, int Order>
-ASPERITY_INLINE FieldJet evaluate(const CellPolynomial& cell, const Vec3& p) noexcept {
-  constexpr int n = Degree + 1;
-  constexpr auto row = static_cast<std::size_t>(n);
-  constexpr std::size_t plane = row * row;
-  Basis<Degree, double> b[3];
-  for (int a = 0; a < 3; ++a) {
-    const double scale = cell.per_width[a];
-    bernstein<Degree, Order>((p[a] - cell.lower[a]) * scale, scale, b[a]);
-  }
+  const double row[2] = {w.y() * low[0] + u.y() * low[2], w.y() * low[1] + u.y() * low[3]};
   FieldJet out;
-  double v[plane];
-  double v_[row];
-  contract<Degree, n * n>(cell.coefficient, b[2].value, v);
-  contract<Degree, n>(v, b[1].value, v_);
-  out.value = along_x<n>(v_, b[0].value);
+  out.value = w.x() * row[0] + u.x() * row[1];
   if constexpr (Order >= 1) {
-    double z[plane];
-    double z_[row];
-    double y_[row];
-    contract<Degree, n * n>(cell.coefficient, b[2].slope, z);
-    contract<Degree, n>(z, b[1].value, z_);
-    contract<Degree, n>(v, b[1].slope, y_);
-    out.gradient = Vec3(along_x<n>(v_, b[0].slope), along_x<n>(y_, b[0].value), along_x<n>(z_, b[0].value));
+    const double row_y[2] = {low[2] - low[0], low[3] - low[1]};
+    const double row_z[2] = {w.y() * step[0] + u.y() * step[2], w.y() * step[1] + u.y() * step[3]};
+    out.gradient = Vec3(row[1] - row[0], w.x() * row_y[0] + u.x() * row_y[1], w.x() * row_z[0] + u.x() * row_z[1])
+                       .cwiseProduct(cell.per_width);
     if constexpr (Order >= 2) {
-      double zz[plane];
-      double zz_[row];
-      double yz_[row];
-      double yy_[row];
-      contract<Degree, n * n>(cell.coefficient, b[2].bend, zz);
-      contract<Degree, n>(zz, b[1].value, zz_);
-      contract<Degree, n>(z, b[1].slope, yz_);
-      contract<Degree, n>(v, b[1].bend, yy_);
-      const double xy = along_x<n>(y_, b[0].slope);
-      const double xz = along_x<n>(z_, b[0].slope);
-      const double yz = along_x<n>(yz_, b[0].value);
-      out.hessian << along_x<n>(v_, b[0].bend), xy, xz,  //
-          xy, along_x<n>(yy_, b[0].value), yz,           //
-          xz, yz, along_x<n>(zz_, b[0].value);
+      const double xy = (row_y[1] - row_y[0]) * cell.per_width.x() * cell.per_width.y();
+      const double xz = (row_z[1] - row_z[0]) * cell.per_width.x() * cell.per_width.z();
+      const double yz =
+          (w.x() * (step[2] - step[0]) + u.x() * (step[3] - step[1])) * cell.per_width.y() * cell.per_width.z();
+      out.hessian << 0.0, xy, xz, xy, 0.0, yz, xz, yz, 0.0;
     }
   }
   return out;
 }
-
-/// At four places side by side: to rounding what each alone is, as sums may be fused in another order.
-template <int Degree>
-ASPERITY_INLINE void evaluate_four(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
-  constexpr int n = Degree + 1;
-  constexpr auto row = static_cast<std::size_t>(n);
-  constexpr std::size_t plane = row * row;
-  Basis<Degree, FourLanes> b[3];
-  for (int a = 0; a < 3; ++a) {
-    FourLanes u;
-    std::memcpy(&u, &places[static_cast<std::size_t>(a)], sizeof(u));
-    bernstein<Degree, 0>(FourLanes((u - cell.lower[a]) * cell.per_width[a]), 1.0, b[a]);
-  }
-  FourLanes v[plane];
-  FourLanes v_[row];
-  contract<Degree, n * n>(cell.coefficient, b[2].value, v);
-  contract<Degree, n>(v, b[1].value, v_);
-  FourLanes sum = {};
-  for (std::size_t i = 0; i < row; ++i) sum += b[0].value[i] * v_[i];
-  std::memcpy(&values, &sum, sizeof(sum));
-}
-
-double cubic_value(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 0>(cell, p).value;
-}
-void cubic_values(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
-  evaluate_four<3>(cell, places, values);
-}
-FieldJet cubic_gradient(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 1>(cell, p);
-}
-FieldJet cubic_jet(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 2>(cell, p);
-}
-#ifdef ASPERITY_WIDE
-[[gnu::target("avx2,fma")]] double cubic_value_wide(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 0>(cell, p).value;
-}
-[[gnu::target("avx2,fma")]] void cubic_values_wide(const CellPolynomial& cell, const Places& places,
-                                                   Lanes& values) noexcept {
-  evaluate_four<3>(cell, places, values);
-}
-[[gnu::target("avx2,fma")]] FieldJet cubic_gradient_wide(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 1>(cell, p);
-}
-[[gnu::target("avx2,fma")]] FieldJet cubic_jet_wide(const CellPolynomial& cell, const Vec3& p) noexcept {
-  return evaluate<3, 2>(cell, p);
-}
-#endif
-
-/// What a cell's coefficients say of all of it.
-struct CellRanges {
-  double low = infinity;
-  double high = -infinity;
-  double sum = 0.0;
-  Vec3 step_low = Vec3::Constant(infinity);  ///< of differences of neighbours along each axis
-  Vec3 step_high = Vec3::Constant(-infinity);
-};
-
-class LaneRange {
- public:
-  ASPERITY_INLINE void include(const FourLanes& values) noexcept {
-    least_ = values < least_ ? values : least_;
-    greatest_ = values > greatest_ ? values : greatest_;
-  }
-  ASPERITY_INLINE void tell(double& low, double& high) const noexcept {
-    for (std::size_t l = 0; l < lanes; ++l) {
-      low = least_[l] < low ? least_[l] : low;
-      high = greatest_[l] > high ? greatest_[l] : high;
-    }
-  }
-
- private:
-  FourLanes least_ = FourLanes{} + infinity;
-  FourLanes greatest_ = FourLanes{} - infinity;
-};
-
-/// A row along x fills the lanes.
-ASPERITY_INLINE void cubic_ranges_of(const double* c, CellRanges& out) noexcept {
-  using Four = long long __attribute__((vector_size(lanes * sizeof(long long))));
-  FourLanes row[16];
-  std::memcpy(row, c, sizeof(row));
-  LaneRange all;
-  LaneRange steps[3];
-  FourLanes sum = {};
-  for (int r = 0; r < 16; ++r) {
-    all.include(row[r]);
-    sum += row[r];
-    // Three differences; the last one twice.
-    const FourLanes along = __builtin_shuffle(row[r], Four{1, 2, 3, 3}) - __builtin_shuffle(row[r], Four{0, 1, 2, 2});
-    steps[0].include(along);
-    if (r % 4 != 3) steps[1].include(row[r + 1] - row[r]);
-    if (r < 12) steps[2].include(row[r + 4] - row[r]);
-  }
-  all.tell(out.low, out.high);
-  out.sum = sum[0] + sum[1] + sum[2] + sum[3];
-  for (int a = 0; a < 3; ++a) steps[a].tell(out.step_low[a], out.step_high[a]);
-}
-
-void cubic_ranges(const double* coefficients, CellRanges& out) noexcept {
-  cubic_ranges_of(coefficients, out);
-}
-#ifdef ASPERITY_WIDE
-[[gnu::target("avx2,fma")]] void cubic_ranges_wide(const double* coefficients, CellRanges& out) noexcept {
-  cubic_ranges_of(coefficients, out);
-}
-#endif
 
 /// Of a trilinear cell.
 void linear_ranges(const double* c, CellRanges& out) noexcept {
@@ -248,27 +59,6 @@ void linear_ranges(const double* c, CellRanges& out) noexcept {
   out.high = greatest(all(greatest, c[0], c[1], c[2], c[3]), all(greatest, c[4], c[5], c[6], c[7]));
   out.sum = ((c[0] + c[1]) + (c[2] + c[3])) + ((c[4] + c[5]) + (c[6] + c[7]));
 }
-
-/// How cubic cells are evaluated on this processor: chosen once.
-struct CubicKernels {
-  double (*value)(const CellPolynomial&, const Vec3&) noexcept = cubic_value;
-  void (*values)(const CellPolynomial&, const Places&, Lanes&) noexcept = cubic_values;
-  FieldJet (*gradient)(const CellPolynomial&, const Vec3&) noexcept = cubic_gradient;
-  FieldJet (*jet)(const CellPolynomial&, const Vec3&) noexcept = cubic_jet;
-  void (*ranges)(const double*, CellRanges&) noexcept = cubic_ranges;
-  CubicKernels() noexcept {
-#ifdef ASPERITY_WIDE
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-      value = cubic_value_wide;
-      values = cubic_values_wide;
-      gradient = cubic_gradient_wide;
-      jet = cubic_jet_wide;
-      ranges = cubic_ranges_wide;
-    }
-#endif
-  }
-};
-const CubicKernels cubic;
 
 /// Along a straight line a cell of degree d is a polynomial of degree 3 d. Its Bernstein coefficients from its values
 /// at evenly spaced places: the inverse of the basis at these places, found once.
@@ -445,7 +235,7 @@ void CellPolynomial::finish() noexcept {
   if (degree == 1) {
     linear_ranges(coefficient, ranges);
   } else {
-    cubic.ranges(coefficient, ranges);
+    cubic_kernels.ranges(coefficient, ranges);
   }
   known = std::isfinite(ranges.sum);
   low_ = ranges.low;
@@ -495,19 +285,26 @@ double CellPolynomial::most_bend() const noexcept {
 }
 
 double CellPolynomial::value(const Vec3& p) const noexcept {
-  return degree == 1 ? evaluate<1, 0>(*this, p).value : cubic.value(*this, p);
+  return degree == 1 ? linear_jet<0>(*this, p).value : cubic_kernels.value(*this, p);
 }
 
 FieldJet CellPolynomial::gradient(const Vec3& p) const noexcept {
-  return degree == 1 ? evaluate<1, 1>(*this, p) : cubic.gradient(*this, p);
+  if (degree == 1) return linear_jet<1>(*this, p);
+  FieldJet out;
+  cubic_kernels.gradient(*this, p, out);
+  return out;
 }
 
 FieldJet CellPolynomial::jet(const Vec3& p) const noexcept {
-  return degree == 1 ? evaluate<1, 2>(*this, p) : cubic.jet(*this, p);
+  if (degree == 1) return linear_jet<2>(*this, p);
+  FieldJet out;
+  cubic_kernels.jet(*this, p, out);
+  return out;
 }
 
 void CellPolynomial::values(const Places& places, Lanes& out) const noexcept {
-  degree == 1 ? evaluate_four<1>(*this, places, out) : cubic.values(*this, places, out);
+  if (degree != 1) return cubic_kernels.values(*this, places, out);
+  for (std::size_t l = 0; l < lanes; ++l) out[l] = value({places[0][l], places[1][l], places[2][l]});
 }
 
 bool CellPolynomial::leaves_sign(const Vec3& a, const Vec3& b, double t0, double t1, double threshold, double sign,

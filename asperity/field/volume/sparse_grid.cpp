@@ -117,6 +117,27 @@ using Pair = double __attribute__((vector_size(16)));
                                                       slope_z[0] + at[0] * (slope_z[1] - slope_z[0]))};
 }
 
+/// The trilinear value of a cell, and the centre differences at its eight nodes, interpolated: of the rows of four
+/// nodes along x around it, by y and z 0 to 3, `inner` answers the middle two, `outer` the others.
+template <class Inner, class Outer>
+[[gnu::always_inline]] inline Potential by_centre_differences(const Inner& inner, const Outer& outer,
+                                                              const double at[3], double per_voxel) noexcept {
+  const double x[2] = {1.0 - at[0], at[0]};
+  const double y[2] = {1.0 - at[1], at[1]};
+  const double z[2] = {1.0 - at[2], at[2]};
+  const auto between = [&](const auto& rows, int j) { return z[0] * rows(j, 1) + z[1] * rows(j, 2); };
+  const auto along_z = [&](int j) { return z[0] * (inner(j, 2) - inner(j, 0)) + z[1] * (inner(j, 3) - inner(j, 1)); };
+  const Pair low = between(inner, 1);
+  const Pair high = between(inner, 2);
+  const Pair middle = y[0] * low + y[1] * high;
+  const Pair ends = y[0] * between(outer, 1) + y[1] * between(outer, 2);
+  const Pair slope_y = y[0] * (high - between(inner, 0)) + y[1] * (between(inner, 3) - low);
+  const Pair slope_z = y[0] * along_z(1) + y[1] * along_z(2);
+  const Vec3 differences(x[0] * (middle[1] - ends[0]) + x[1] * (ends[1] - middle[0]),
+                         x[0] * slope_y[0] + x[1] * slope_y[1], x[0] * slope_z[0] + x[1] * slope_z[1]);
+  return {x[0] * middle[0] + x[1] * middle[1], (0.5 * per_voxel) * differences};
+}
+
 }  // namespace
 
 std::span<const char* const> material_channel_names() {
@@ -521,22 +542,47 @@ Potential SparseGrid::trilinear(const Vec3& p, SparseHint& hint) const noexcept 
                       per_voxel_);
 }
 
-template <class Take>
-bool SparseGrid::take_nodes(const Vec3& p, SparseHint& hint, const Take& take) const noexcept {
+Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
   Place place;
-  double c[64];
   if (const Brick* brick = locate(p, hint, place)) {
     const float* first = brick->value + first_node(place.cell, 1);
-    double* out = c;
-    for (int k = 0; k < 4; ++k) {
-      for (int j = 0; j < 4; ++j) {
-        for (int i = 0; i < 4; ++i) *out++ = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
-      }
-    }
+    const auto row = [&](int j, int k) { return first + apron_side * (j + apron_side * k); };
+    return by_centre_differences([&](int j, int k) { return edge_at(row(j, k) + 1); },
+                                 [&](int j, int k) {
+                                   return Pair{static_cast<double>(row(j, k)[0]), static_cast<double>(row(j, k)[3])};
+                                 },
+                                 place.fraction, per_voxel_);
+  }
+  if (hint.owner == 0) return {outside_, Vec3::Zero()};
+  double c[64];
+  far_samples(hint, place, 1, c);
+  const auto row = [&](int j, int k) { return c + 4 * (j + 4 * k); };
+  return by_centre_differences(
+      [&](int j, int k) {
+        return Pair{row(j, k)[1], row(j, k)[2]};
+      },
+      [&](int j, int k) {
+        return Pair{row(j, k)[0], row(j, k)[3]};
+      },
+      place.fraction, per_voxel_);
+}
+
+Vec3 SparseGrid::clear_gradient(const Vec3& p, SparseHint& hint) const noexcept {
+  Place place;
+  const Brick* brick = locate(p, hint, place);
+  if (hint.owner == 0) return Vec3::Zero();
+  double c[64];
+  if (brick != nullptr) {
+    const float* first = brick->value + first_node(place.cell, 1);
+    for_each_in_cube(0, 4, [&](int i, int j, int k) {
+      c[i + 4 * (j + 4 * k)] = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
+    });
   } else {
-    if (hint.owner == 0) return false;
     far_samples(hint, place, 1, c);
   }
+  const double scale = 0.5 * per_voxel_;
+  Vec3 sum = Vec3::Zero();
+  double weights = 0.0;
   for (int n = 0; n < 8; ++n) {
     const int node = 21 + (n & 1) + 4 * (n >> 1 & 1) + 16 * (n >> 2);
     double weight = 1.0;
@@ -544,35 +590,14 @@ bool SparseGrid::take_nodes(const Vec3& p, SparseHint& hint, const Take& take) c
       const double f = place.fraction[a];
       weight *= (n >> a & 1) != 0 ? f : 1.0 - f;
     }
-    take(weight, c[node], Vec3(c[node + 1] - c[node - 1], c[node + 4] - c[node - 4], c[node + 16] - c[node - 16]));
-  }
-  return true;
-}
-
-Potential SparseGrid::node_gradients(const Vec3& p, SparseHint& hint) const noexcept {
-  Potential out;
-  if (!take_nodes(p, hint, [&](double weight, double value, const Vec3& difference) {
-        out.value += weight * value;
-        out.gradient += (0.5 * weight * per_voxel_) * difference;
-      }))
-    return {outside_, Vec3::Zero()};
-  return out;
-}
-
-NodeGradients SparseGrid::edge_gradients(const Vec3& p, SparseHint& hint) const noexcept {
-  NodeGradients out;
-  const double scale = 0.5 * per_voxel_;
-  double weights = 0.0;
-  take_nodes(p, hint, [&](double weight, double, const Vec3& difference) {
-    const Vec3 gradient = scale * difference;
+    const Vec3 gradient =
+        scale * Vec3(c[node + 1] - c[node - 1], c[node + 4] - c[node - 4], c[node + 16] - c[node - 16]);
     const double squared = gradient.squaredNorm();
-    const double clear = weight * (squared * squared) * (squared * squared);
-    out.mean += weight * gradient;
-    out.clear += clear * gradient;
-    weights += clear;
-  });
-  if (weights > 0.0) out.clear /= weights;
-  return out;
+    weight *= (squared * squared) * (squared * squared);
+    sum += weight * gradient;
+    weights += weight;
+  }
+  return weights > 0.0 ? Vec3(sum / weights) : sum;
 }
 
 std::uint32_t SparseGrid::face(const Vec3& p, SparseHint& hint) const noexcept {

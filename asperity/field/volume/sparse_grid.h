@@ -72,13 +72,6 @@ struct Potential {
   Vec3 gradient = Vec3::Zero();
 };
 
-/// Gradients of the eight nodes around a place (centre differences), interpolated. Of a distance each is as long as 1,
-/// but shorter where the difference reaches over an edge of what is nearest.
-struct NodeGradients {
-  Vec3 mean = Vec3::Zero();
-  Vec3 clear = Vec3::Zero();  ///< those that are shorter count less: the nearest face's, from a voxel off an edge on
-};
-
 /// A potential on a regular grid, kept in bricks of 8 x 8 x 8 cells where it lies within a band around zero; beyond the
 /// band it is constant. Each brick repeats its neighbours' nearest points (its apron), so that a query reads one brick.
 /// Immutable; queries are const, allocation-free and safe from any thread. An edited copy shares the bricks that did
@@ -129,8 +122,10 @@ class SparseGrid {
   /// As hybrid-surface-2004 has it: the trilinear value, and the gradients of the eight nodes (centre differences)
   /// interpolated, which is not the gradient of the value. [servo]
   [[nodiscard]] Potential node_gradients(const Vec3& p, SparseHint& hint) const noexcept;
-  /// The same gradients, interpolated in two ways. Beyond the bricks' box none. [servo]
-  [[nodiscard]] NodeGradients edge_gradients(const Vec3& p, SparseHint& hint) const noexcept;
+  /// The same gradients' mean, those that are shorter counting less. Of a distance each is as long as 1, but shorter
+  /// where the difference reaches over an edge of what is nearest: from a voxel off an edge on this is the nearest
+  /// face's. Beyond the bricks' box none. [servo]
+  [[nodiscard]] Vec3 clear_gradient(const Vec3& p, SparseHint& hint) const noexcept;
   /// The stored point nearest to p: its closest face; no_index where none is known. [servo]
   [[nodiscard]] std::uint32_t face(const Vec3& p, SparseHint& hint) const noexcept;
   /// The eight stored points' materials, interpolated; `own` stands in for what they leave open. [servo]
@@ -162,9 +157,6 @@ class SparseGrid {
   bool find_brick(const double at[3], SparseHint& hint) const noexcept;
   /// cell_samples around a place where no brick is stored.
   void far_samples(const SparseHint& hint, const Place& place, int ring, double* out) const noexcept;
-  /// take(weight, value, gradient times two voxels) of the eight nodes around p; false beyond the bricks' box.
-  template <class Take>
-  bool take_nodes(const Vec3& p, SparseHint& hint, const Take& take) const noexcept;
   [[nodiscard]] float constant(std::int32_t entry) const noexcept {
     return static_cast<float>(entry == outside_entry ? outside_ : inside_);
   }

@@ -180,7 +180,8 @@ Vec3 arrival_normal(const Felt& felt, const Vec3& probe, HeldPoint& state) noexc
 
 /// Of a probe that is inside by `depth` (m): the pull per depth. The potential's own gradient; near an edge, where an
 /// energy's slope is too short to stand for the depth and its direction swings, the direction of the nodes' gradients.
-Vec3 slope_inside(double depth, const Vec3& gradient, const NodeGradients& nodes, double voxel) noexcept {
+Vec3 slope_inside(double depth, const Vec3& gradient, const SparseGrid& untextured, const Vec3& probe,
+                  SparseHint& hint) noexcept {
   // Lengths of the mean gradient. A texture's slope is 1 and more; a distance's is less within two voxels of an edge.
   constexpr double no_edge = 0.9975;
   constexpr double at_edge = 0.975;
@@ -188,16 +189,20 @@ Vec3 slope_inside(double depth, const Vec3& gradient, const NodeGradients& nodes
   constexpr double mixed = 0.7;     // where two faces at a right angle are equally near
   constexpr double crest = 0.25;    // less: the middle of a thin sheet, where the force turns round through 0
   constexpr double rounding = 0.3;  // voxels: what an edge's interpolated depth lacks, by what its gradient does
-  const double length = nodes.mean.norm();
+  const Vec3 mean = untextured.node_gradients(probe, hint).gradient;
+  const double length = mean.norm();
   if (length >= no_edge) return gradient;
   if (!(length > 0.0)) return Vec3::Zero();
   const double share = std::min(1.0, (no_edge - length) / (no_edge - at_edge));
-  const Vec3 middle = nodes.mean / length;
+  const Vec3 middle = mean / length;
   Vec3 way = middle;
-  if (const double sharp = nodes.clear.norm(); length > mixed && sharp > 0.0) {
+  if (length > mixed) {
     const double t = std::min(1.0, (length - mixed) / (clear - mixed));
-    way = (middle + t * t * (3.0 - 2.0 * t) * (nodes.clear / sharp - middle)).normalized();
+    const Vec3 sharp = untextured.clear_gradient(probe, hint);
+    if (const double size = sharp.norm(); size > 0.0)
+      way = (middle + t * t * (3.0 - 2.0 * t) * (sharp / size - middle)).normalized();
   }
+  const double voxel = untextured.voxel();
   const double size = std::min(1.0, length / crest) *
                       (1.0 + rounding * (1.0 - length * length) * std::min(1.0, voxel / std::max(depth, 1e-3 * voxel)));
   return (1.0 - share) * gradient + share * size * way;
@@ -210,9 +215,7 @@ Pull spring_at(const Felt& felt, const Trust& trust, double band, const Potentia
   Pull spring;
   spring.slope = here.gradient;
   // A magnet stays an energy's slope all over: what it gives on the way in is asked back on the way out.
-  if (g < 0.0 && band == 0.0)
-    spring.slope =
-        slope_inside(-g, here.gradient, untextured.edge_gradients(probe, state.cache.sparse), untextured.voxel());
+  if (g < 0.0 && band == 0.0) spring.slope = slope_inside(-g, here.gradient, untextured, probe, state.cache.sparse);
   spring.foot = probe - g * spring.slope;
   spring.trust = trust.at(g);
   if (spring.trust == 1.0) {

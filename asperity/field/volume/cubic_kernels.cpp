@@ -1,0 +1,244 @@
+#include "asperity/field/volume/cubic_kernels.h"
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#if defined(__GNUC__) && defined(__x86_64__)
+// The same code once more for processors with wider registers.
+#define ASPERITY_WIDE 1
+#define ASPERITY_INLINE [[gnu::always_inline]] inline
+#else
+#define ASPERITY_INLINE inline
+#endif
+
+namespace asperity {
+
+namespace {
+
+using Places = CellPolynomial::Places;
+using FourLanes = double __attribute__((vector_size(lanes * sizeof(double))));
+/// Of coefficients, where they lie.
+using Row [[gnu::may_alias]] = double __attribute__((vector_size(lanes * sizeof(double)), aligned(alignof(double))));
+using Pick = long long __attribute__((vector_size(lanes * sizeof(long long))));
+
+/// Bernstein polynomials of degree 3 and their derivatives: the same for all lanes, or at four places.
+struct Basis {
+  FourLanes value[4];
+  FourLanes slope[4];
+  FourLanes bend[4];
+};
+
+/// At u, derivatives up to `Order`.
+template <int Order>
+ASPERITY_INLINE void bernstein(const FourLanes& u, double scale, Basis& b) noexcept {
+  const FourLanes w = 1.0 - u;
+  const FourLanes w_squared = w * w;
+  const FourLanes u_squared = u * u;
+  b.value[0] = w_squared * w;
+  b.value[1] = 3.0 * u * w_squared;
+  b.value[2] = 3.0 * w * u_squared;
+  b.value[3] = u_squared * u;
+  if constexpr (Order >= 1) {
+    const FourLanes s = FourLanes{} + 3.0 * scale;
+    b.slope[0] = -s * w_squared;
+    b.slope[1] = s * w * (w - 2.0 * u);
+    b.slope[2] = s * u * (2.0 * w - u);
+    b.slope[3] = s * u_squared;
+  }
+  if constexpr (Order >= 2) {
+    const FourLanes s = FourLanes{} + 6.0 * scale * scale;
+    b.bend[0] = s * w;
+    b.bend[1] = s * (u - 2.0 * w);
+    b.bend[2] = s * (w - 2.0 * u);
+    b.bend[3] = s * u;
+  }
+}
+
+/// One polynomial a lane, all at the same u.
+struct LaneBasis {
+  FourLanes value;
+  FourLanes slope;
+  FourLanes bend;
+};
+
+template <int Order>
+ASPERITY_INLINE void bernstein_lanes(const FourLanes& u, double scale, LaneBasis& b) noexcept {
+  const FourLanes w = 1.0 - u;
+  const FourLanes both = __builtin_shuffle(w, u, Pick{0, 0, 4, 4});
+  b.value = FourLanes{1.0, 3.0, 3.0, 1.0} * __builtin_shuffle(w, u, Pick{0, 0, 0, 4}) * both *
+            __builtin_shuffle(w, u, Pick{0, 4, 4, 4});
+  if constexpr (Order >= 1)
+    b.slope = 3.0 * scale * both * (FourLanes{-1.0, 1.0, 2.0, 0.0} * w + FourLanes{0.0, -2.0, -1.0, 1.0} * u);
+  if constexpr (Order >= 2)
+    b.bend = 6.0 * scale * scale * (FourLanes{1.0, -2.0, 1.0, 0.0} * w + FourLanes{0.0, 1.0, -2.0, 1.0} * u);
+}
+
+// Lanes are handed back through references: where registers are narrower no function could return them.
+
+/// Weighted sum of four, `Stride` apart.
+template <int Stride, class In>
+ASPERITY_INLINE void blend(const In* in, const FourLanes* weights, FourLanes& out) noexcept {
+  out = weights[0] * in[0] + weights[1] * in[Stride] + weights[2] * in[2 * Stride] + weights[3] * in[3 * Stride];
+}
+
+/// Along z: a plane of rows.
+ASPERITY_INLINE void blend_planes(const Row* rows, const FourLanes* weights, FourLanes* plane) noexcept {
+  for (int j = 0; j < 4; ++j) blend<4>(rows + j, weights, plane[j]);
+}
+
+/// The sums of the lanes of each.
+ASPERITY_INLINE void add_lanes(const FourLanes (&of)[4], FourLanes& sums) noexcept {
+  const FourLanes low =
+      __builtin_shuffle(of[0], of[1], Pick{0, 4, 2, 6}) + __builtin_shuffle(of[0], of[1], Pick{1, 5, 3, 7});
+  const FourLanes high =
+      __builtin_shuffle(of[2], of[3], Pick{0, 4, 2, 6}) + __builtin_shuffle(of[2], of[3], Pick{1, 5, 3, 7});
+  sums = __builtin_shuffle(low, high, Pick{0, 1, 4, 5}) + __builtin_shuffle(low, high, Pick{2, 3, 6, 7});
+}
+
+template <int Order>
+ASPERITY_INLINE void evaluate(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {
+  LaneBasis x;
+  Basis y;
+  Basis z;
+  FourLanes at[3];
+  for (int a = 0; a < 3; ++a) at[a] = FourLanes{} + (p[a] - cell.lower[a]) * cell.per_width[a];
+  bernstein_lanes<Order>(at[0], cell.per_width[0], x);
+  bernstein<Order>(at[1], cell.per_width[1], y);
+  bernstein<Order>(at[2], cell.per_width[2], z);
+  const auto* rows = reinterpret_cast<const Row*>(cell.coefficient);
+  FourLanes plane[4];
+  FourLanes row;
+  blend_planes(rows, z.value, plane);
+  blend<1>(plane, y.value, row);
+  if constexpr (Order == 0) {
+    const FourLanes terms = row * x.value;
+    out.value = (terms[0] + terms[1]) + (terms[2] + terms[3]);
+  } else {
+    FourLanes slopes[4];
+    FourLanes row_y;
+    FourLanes row_z;
+    blend_planes(rows, z.slope, slopes);
+    blend<1>(plane, y.slope, row_y);
+    blend<1>(slopes, y.value, row_z);
+    FourLanes sums;
+    add_lanes({row * x.value, row * x.slope, row_y * x.value, row_z * x.value}, sums);
+    out.value = sums[0];
+    out.gradient = Vec3(sums[1], sums[2], sums[3]);
+    if constexpr (Order == 2) {
+      FourLanes bends[4];
+      FourLanes row_yy;
+      FourLanes row_yz;
+      FourLanes row_zz;
+      blend_planes(rows, z.bend, bends);
+      blend<1>(plane, y.bend, row_yy);
+      blend<1>(slopes, y.slope, row_yz);
+      blend<1>(bends, y.value, row_zz);
+      FourLanes mixed;  // xx, xy, xz, yy
+      FourLanes rest;   // yz, zz
+      add_lanes({row * x.bend, row_y * x.slope, row_z * x.slope, row_yy * x.value}, mixed);
+      add_lanes({row_yz * x.value, row_zz * x.value, FourLanes{}, FourLanes{}}, rest);
+      out.hessian << mixed[0], mixed[1], mixed[2],  //
+          mixed[1], mixed[3], rest[0],              //
+          mixed[2], rest[0], rest[1];
+    }
+  }
+}
+
+/// At four places side by side: to rounding what each alone is, as sums may be fused in another order.
+ASPERITY_INLINE void evaluate_four(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {
+  Basis b[3];
+  for (int a = 0; a < 3; ++a) {
+    FourLanes u;
+    std::memcpy(&u, &places[static_cast<std::size_t>(a)], sizeof(u));
+    bernstein<0>((u - cell.lower[a]) * cell.per_width[a], 1.0, b[a]);
+  }
+  FourLanes plane[16];
+  FourLanes row[4];
+  FourLanes sum;
+  for (int i = 0; i < 16; ++i) blend<16>(cell.coefficient + i, b[2].value, plane[i]);
+  for (int i = 0; i < 4; ++i) blend<4>(plane + i, b[1].value, row[i]);
+  blend<1>(row, b[0].value, sum);
+  std::memcpy(&values, &sum, sizeof(sum));
+}
+
+class LaneRange {
+ public:
+  ASPERITY_INLINE void include(const FourLanes& values) noexcept {
+    least_ = values < least_ ? values : least_;
+    greatest_ = values > greatest_ ? values : greatest_;
+  }
+  ASPERITY_INLINE void tell(double& low, double& high) const noexcept {
+    for (std::size_t l = 0; l < lanes; ++l) {
+      low = least_[l] < low ? least_[l] : low;
+      high = greatest_[l] > high ? greatest_[l] : high;
+    }
+  }
+
+ private:
+  FourLanes least_ = FourLanes{} + infinity;
+  FourLanes greatest_ = FourLanes{} - infinity;
+};
+
+ASPERITY_INLINE void ranges_of(const double* c, CellRanges& out) noexcept {
+  FourLanes row[16];
+  std::memcpy(row, c, sizeof(row));
+  LaneRange all;
+  LaneRange steps[3];
+  FourLanes sum = {};
+  for (int r = 0; r < 16; ++r) {
+    all.include(row[r]);
+    sum += row[r];
+    // Three differences; the last one twice.
+    const FourLanes along = __builtin_shuffle(row[r], Pick{1, 2, 3, 3}) - __builtin_shuffle(row[r], Pick{0, 1, 2, 2});
+    steps[0].include(along);
+    if (r % 4 != 3) steps[1].include(row[r + 1] - row[r]);
+    if (r < 12) steps[2].include(row[r + 4] - row[r]);
+  }
+  all.tell(out.low, out.high);
+  out.sum = sum[0] + sum[1] + sum[2] + sum[3];
+  for (int a = 0; a < 3; ++a) steps[a].tell(out.step_low[a], out.step_high[a]);
+}
+
+// The names of both forms of each.
+#define ASPERITY_CUBIC_KERNELS(suffix, target)                                                           \
+  target double value##suffix(const CellPolynomial& cell, const Vec3& p) noexcept {                      \
+    FieldJet out;                                                                                        \
+    evaluate<0>(cell, p, out);                                                                           \
+    return out.value;                                                                                    \
+  }                                                                                                      \
+  target void values##suffix(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept { \
+    evaluate_four(cell, places, values);                                                                 \
+  }                                                                                                      \
+  target void gradient##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {      \
+    evaluate<1>(cell, p, out);                                                                           \
+  }                                                                                                      \
+  target void jet##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {           \
+    evaluate<2>(cell, p, out);                                                                           \
+  }                                                                                                      \
+  target void ranges##suffix(const double* coefficients, CellRanges& out) noexcept {                     \
+    ranges_of(coefficients, out);                                                                        \
+  }
+
+ASPERITY_CUBIC_KERNELS(_plain, )
+#ifdef ASPERITY_WIDE
+ASPERITY_CUBIC_KERNELS(_wide, [[gnu::target("avx2,fma")]])
+#endif
+
+CubicKernels chosen() noexcept {
+#ifdef ASPERITY_WIDE
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    return {value_wide, values_wide, gradient_wide, jet_wide, ranges_wide};
+#endif
+  return plain_cubic_kernels();
+}
+
+}  // namespace
+
+CubicKernels plain_cubic_kernels() noexcept {
+  return {value_plain, values_plain, gradient_plain, jet_plain, ranges_plain};
+}
+
+const CubicKernels cubic_kernels = chosen();
+
+}  // namespace asperity

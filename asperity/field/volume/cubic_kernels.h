@@ -1,0 +1,31 @@
+#pragma once
+// The inner loops of smooth cells: Bernstein form of degree 3 along each axis, a row along x filling the lanes.
+// Each exists twice, from the same source: for every processor, and for those with AVX2, chosen once. Private to field.
+
+#include "asperity/field/volume/cell_polynomial.h"
+
+namespace asperity {
+
+/// What a cell's coefficients say of all of it.
+struct CellRanges {
+  double low = infinity;
+  double high = -infinity;
+  double sum = 0.0;
+  Vec3 step_low = Vec3::Constant(infinity);  ///< of differences of neighbours along each axis
+  Vec3 step_high = Vec3::Constant(-infinity);
+};
+
+/// How cubic cells are evaluated on this processor. [servo]
+struct CubicKernels {
+  double (*value)(const CellPolynomial&, const Vec3&) noexcept;
+  void (*values)(const CellPolynomial&, const CellPolynomial::Places&, Lanes&) noexcept;
+  /// Value and gradient; the rest of the jet is left as it is.
+  void (*gradient)(const CellPolynomial&, const Vec3&, FieldJet&) noexcept;
+  void (*jet)(const CellPolynomial&, const Vec3&, FieldJet&) noexcept;
+  void (*ranges)(const double* coefficients, CellRanges&) noexcept;
+};
+extern const CubicKernels cubic_kernels;
+/// Those for every processor: what the others are tested against. [any]
+CubicKernels plain_cubic_kernels() noexcept;
+
+}  // namespace asperity
