@@ -360,9 +360,11 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
                                    1e-6 * bounds.diagonal())));
   }
   scene.direct_ = settings.view.identity();
-  scene.reads_volumes_ = !effects.empty();
+  for (const FieldEffect& effect : effects)
+    scene.reads_bricks_ = scene.reads_bricks_ || effect.field->bricks() != nullptr;
   for (const Instance& instance : instances) {
-    scene.reads_volumes_ = scene.reads_volumes_ || iso_of(instance.surface) != nullptr;
+    const IsoSurface* iso = iso_of(instance.surface);
+    scene.reads_bricks_ = scene.reads_bricks_ || (iso != nullptr && iso->field().bricks() != nullptr);
     scene.moves_ = scene.moves_ || instance.motion.moves();
     scene.lends_ += well_of(instance);
   }

@@ -60,8 +60,8 @@ class Scene {
   [[nodiscard]] std::span<const FieldEffect> effects() const noexcept {
     return given_effects_.empty() ? felt_effects_ : given_effects_;
   }
-  /// Whether a tick may read a volume: for an isosurface or an effect. [servo]
-  [[nodiscard]] bool reads_volumes() const noexcept { return reads_volumes_; }
+  /// Whether a tick may read a volume that is larger than memory: for an isosurface or an effect. [servo]
+  [[nodiscard]] bool reads_bricks() const noexcept { return reads_bricks_; }
   /// Whether the scene is the workspace: the view changes nothing. [servo]
   [[nodiscard]] bool direct() const noexcept { return direct_; }
   /// Whether an instance moves on by itself. [servo]
@@ -119,7 +119,7 @@ class Scene {
   std::vector<InstanceFacts> facts_;
   SceneSettings settings_;
   std::uint64_t epoch_ = 0;
-  bool reads_volumes_ = false;
+  bool reads_bricks_ = false;
   bool moves_ = false;
   bool draws_ = false;
   double lends_ = 0.0;

@@ -21,7 +21,7 @@ class VolumeReading {
  private:
   template <class Visit>
   void for_each(Visit&& visit) const noexcept {
-    if (!scene_.reads_volumes()) return;
+    if (!scene_.reads_bricks()) return;
     for (const Instance& instance : scene_.felt()) {
       if (const IsoSurface* iso = iso_of(instance.surface)) visit(iso->field());
     }

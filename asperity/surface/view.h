@@ -29,6 +29,16 @@ struct CellCache {
     }
     return other_last ? other : cell;
   }
+  /// The one of the two in whose cell a place lies, clear of its faces; none: that is not known of either. [servo]
+  const CellPolynomial* around(std::uint64_t owner, int level, const Vec3& p) noexcept {
+    const auto has = [&](const CellPolynomial& c) {
+      return c.owner == owner && c.level == level && c.known && c.has_well_inside(p);
+    };
+    if (has(other_last ? other : cell)) return other_last ? &other : &cell;
+    if (!has(other_last ? cell : other)) return nullptr;
+    other_last = !other_last;
+    return other_last ? &other : &cell;
+  }
 };
 
 /// What queries of one surface remember, in the caller's hands. Each reader checks that it is of what it asks about:

@@ -76,19 +76,37 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
   return {a * y0 + b * y1, c * y1, std::hypot(y0, y1)};
 }
 
-/// The same in the tangent plane of a surface that a field gives: from a place where the goal lies `pull` (m) along it
-/// and `depth` (m) above it, `bend` the field's second derivatives over its slope. The pull itself where the distance
-/// is not convex. [servo]
-inline Vec3 tangent_step(const Vec3& normal, const Vec3& pull, double depth, const Mat3& bend) noexcept {
-  const double rate = pull.norm();
-  const Vec3 along = pull / rate;
+/// A step in a tangent plane.
+struct TangentStep {
+  Vec3 step = Vec3::Zero();
+  double drop = 0.0;  ///< how far the surface falls below its end (m)
+};
+
+/// The same in the tangent plane of a surface that a field gives: from a place where the goal lies `pull` (m) along it,
+/// `rate` its length, above 0, and `depth` (m) above it; `second` the field's second derivatives, times `scale` those
+/// over its slope. The pull itself where the distance is not convex. [servo]
+inline TangentStep tangent_step(const Vec3& normal, const Vec3& pull, double rate, double depth, const Mat3& second,
+                                double scale) noexcept {
+  const Vec3 along = (1.0 / rate) * pull;
   const Vec3 across = normal.cross(along);
-  const double a = 1.0 + depth * along.dot(bend * along);
-  const double b = depth * along.dot(bend * across);
-  const double c = 1.0 + depth * across.dot(bend * across);
+  const Vec3 bent = second * along;
+  const double bend_along = scale * along.dot(bent);
+  const double bend_both = scale * across.dot(bent);
+  const double bend_across = scale * across.dot(second * across);
+  const double a = 1.0 + depth * bend_along;
+  const double b = depth * bend_both;
+  const double c = 1.0 + depth * bend_across;
   const double determinant = a * c - b * b;
-  if (a > 0.05 && determinant > 0.05 * c && c > 0.0) return (rate / determinant) * (c * along - b * across);
-  return pull;
+  double go_along = rate;
+  double go_across = 0.0;
+  if (a > 0.05 && determinant > 0.05 * c && c > 0.0) {
+    const double share = rate / determinant;
+    go_along = share * c;
+    go_across = -share * b;
+  }
+  return {go_along * along + go_across * across,
+          0.5 * (go_along * go_along * bend_along + 2.0 * go_along * go_across * bend_both +
+                 go_across * go_across * bend_across)};
 }
 
 }  // namespace asperity

@@ -295,11 +295,12 @@ FieldJet CellPolynomial::gradient(const Vec3& p) const noexcept {
   return out;
 }
 
-FieldJet CellPolynomial::jet(const Vec3& p) const noexcept {
-  if (degree == 1) return linear_jet<2>(*this, p);
-  FieldJet out;
-  cubic_kernels.jet(*this, p, out);
-  return out;
+void CellPolynomial::jet(const Vec3& p, FieldJet& out) const noexcept {
+  if (degree == 1) {
+    out = linear_jet<2>(*this, p);
+  } else {
+    cubic_kernels.jet(*this, p, out);
+  }
 }
 
 void CellPolynomial::values(const Places& places, Lanes& out) const noexcept {

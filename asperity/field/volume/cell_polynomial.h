@@ -55,6 +55,15 @@ class CellPolynomial {
   [[nodiscard]] double low() const noexcept { return low_; }    ///< not above the field anywhere in the cell
   [[nodiscard]] double high() const noexcept { return high_; }  ///< not below it
   [[nodiscard]] Vec3 upper() const noexcept { return lower + width; }
+  /// Whether a place lies in the cell and clear of its faces, so that no rounding would find it in another one. [servo]
+  [[nodiscard]] bool has_well_inside(const Vec3& p) const noexcept {
+    constexpr double clear = 1e-6;  // of its width
+    const auto within = [&](int a) {
+      const double at = (p[a] - lower[a]) * per_width[a];
+      return at > clear && at < 1.0 - clear;
+    };
+    return within(0) && within(1) && within(2);
+  }
   /// Least and greatest of the gradient's component along direction `d` anywhere in the cell: bounds. [servo]
   void slope_range(const Vec3& d, double& least, double& greatest) const noexcept;
   /// How fast the gradient changes by length anywhere in the cell at most: a bound, found when first asked for. [servo]
@@ -68,7 +77,12 @@ class CellPolynomial {
   /// Value and gradient; the hessian is left at zero. [servo]
   [[nodiscard]] FieldJet gradient(const Vec3& p) const noexcept;
   /// Value, gradient and hessian. [servo]
-  [[nodiscard]] FieldJet jet(const Vec3& p) const noexcept;
+  [[nodiscard]] FieldJet jet(const Vec3& p) const noexcept {
+    FieldJet out;
+    jet(p, out);
+    return out;
+  }
+  void jet(const Vec3& p, FieldJet& out) const noexcept;
 
   /// First t in [t0, t1] of the segment from a to b (which lies in the cell there) at which value - threshold has not
   /// the sign `sign` (+1 or -1) any more; false when it keeps that sign throughout. Exact to rounding: no pair of roots

@@ -181,43 +181,77 @@ class LaneRange {
 };
 
 ASPERITY_INLINE void ranges_of(const double* c, CellRanges& out) noexcept {
-  FourLanes row[16];
-  std::memcpy(row, c, sizeof(row));
+  const auto* row = reinterpret_cast<const Row*>(c);
   LaneRange all;
   LaneRange steps[3];
   FourLanes sum = {};
-  for (int r = 0; r < 16; ++r) {
-    all.include(row[r]);
-    sum += row[r];
-    // Three differences; the last one twice.
-    const FourLanes along = __builtin_shuffle(row[r], Pick{1, 2, 3, 3}) - __builtin_shuffle(row[r], Pick{0, 1, 2, 2});
-    steps[0].include(along);
-    if (r % 4 != 3) steps[1].include(row[r + 1] - row[r]);
-    if (r < 12) steps[2].include(row[r + 4] - row[r]);
+#pragma GCC unroll 4
+  for (int k = 0; k < 16; k += 4) {
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; ++j) {
+      const FourLanes here = row[k + j];
+      all.include(here);
+      sum += here;
+      // Three differences; the last one twice.
+      steps[0].include(__builtin_shuffle(here, Pick{1, 2, 3, 3}) - __builtin_shuffle(here, Pick{0, 1, 2, 2}));
+      if (j < 3) steps[1].include(row[k + j + 1] - here);
+      if (k < 12) steps[2].include(row[k + j + 4] - here);
+    }
   }
   all.tell(out.low, out.high);
   out.sum = sum[0] + sum[1] + sum[2] + sum[3];
   for (int a = 0; a < 3; ++a) steps[a].tell(out.step_low[a], out.step_high[a]);
 }
 
+/// Four rows, `stride` apart, to coefficients across them.
+ASPERITY_INLINE void mix_rows(const HermiteWeights& w, int stride, Row* rows) noexcept {
+  const FourLanes s[4] = {rows[0], rows[stride], rows[2 * stride], rows[3 * stride]};
+  rows[0] = s[1];
+  rows[stride] = w.first[0] * s[0] + w.first[1] * s[1] + w.first[2] * s[2];
+  rows[2 * stride] = w.second[1] * s[1] + w.second[2] * s[2] + w.second[3] * s[3];
+  rows[3 * stride] = s[2];
+}
+
+ASPERITY_INLINE void samples_to_bernstein(const std::array<HermiteWeights, 3>& weights, double* c) noexcept {
+  auto* rows = reinterpret_cast<Row*>(c);
+  const HermiteWeights& x = weights[0];
+  // The outer two are the inner samples themselves.
+  const FourLanes left = {1.0, x.first[0], x.second[1], 1.0};
+  const FourLanes middle = {0.0, x.first[1], x.second[2], 0.0};
+  const FourLanes right = {0.0, x.first[2], x.second[3], 0.0};
+#pragma GCC unroll 4
+  for (int r = 0; r < 16; ++r) {
+    const FourLanes s = rows[r];
+    rows[r] = left * __builtin_shuffle(s, Pick{1, 0, 1, 2}) + middle * __builtin_shuffle(s, Pick{1, 1, 2, 2}) +
+              right * __builtin_shuffle(s, Pick{1, 2, 3, 2});
+  }
+#pragma GCC unroll 4
+  for (int k = 0; k < 16; k += 4) mix_rows(weights[1], 1, rows + k);
+#pragma GCC unroll 4
+  for (int j = 0; j < 4; ++j) mix_rows(weights[2], 4, rows + j);
+}
+
 // The names of both forms of each.
-#define ASPERITY_CUBIC_KERNELS(suffix, target)                                                           \
-  target double value##suffix(const CellPolynomial& cell, const Vec3& p) noexcept {                      \
-    FieldJet out;                                                                                        \
-    evaluate<0>(cell, p, out);                                                                           \
-    return out.value;                                                                                    \
-  }                                                                                                      \
-  target void values##suffix(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept { \
-    evaluate_four(cell, places, values);                                                                 \
-  }                                                                                                      \
-  target void gradient##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {      \
-    evaluate<1>(cell, p, out);                                                                           \
-  }                                                                                                      \
-  target void jet##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {           \
-    evaluate<2>(cell, p, out);                                                                           \
-  }                                                                                                      \
-  target void ranges##suffix(const double* coefficients, CellRanges& out) noexcept {                     \
-    ranges_of(coefficients, out);                                                                        \
+#define ASPERITY_CUBIC_KERNELS(suffix, target)                                                                    \
+  target double value##suffix(const CellPolynomial& cell, const Vec3& p) noexcept {                               \
+    FieldJet out;                                                                                                 \
+    evaluate<0>(cell, p, out);                                                                                    \
+    return out.value;                                                                                             \
+  }                                                                                                               \
+  target void values##suffix(const CellPolynomial& cell, const Places& places, Lanes& values) noexcept {          \
+    evaluate_four(cell, places, values);                                                                          \
+  }                                                                                                               \
+  target void gradient##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {               \
+    evaluate<1>(cell, p, out);                                                                                    \
+  }                                                                                                               \
+  target void jet##suffix(const CellPolynomial& cell, const Vec3& p, FieldJet& out) noexcept {                    \
+    evaluate<2>(cell, p, out);                                                                                    \
+  }                                                                                                               \
+  target void ranges##suffix(const double* coefficients, CellRanges& out) noexcept {                              \
+    ranges_of(coefficients, out);                                                                                 \
+  }                                                                                                               \
+  target void to_bernstein##suffix(const std::array<HermiteWeights, 3>& weights, double* coefficients) noexcept { \
+    samples_to_bernstein(weights, coefficients);                                                                  \
   }
 
 ASPERITY_CUBIC_KERNELS(_plain, )
@@ -228,7 +262,7 @@ ASPERITY_CUBIC_KERNELS(_wide, [[gnu::target("avx2,fma")]])
 CubicKernels chosen() noexcept {
 #ifdef ASPERITY_WIDE
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-    return {value_wide, values_wide, gradient_wide, jet_wide, ranges_wide};
+    return {value_wide, values_wide, gradient_wide, jet_wide, ranges_wide, to_bernstein_wide};
 #endif
   return plain_cubic_kernels();
 }
@@ -236,7 +270,7 @@ CubicKernels chosen() noexcept {
 }  // namespace
 
 CubicKernels plain_cubic_kernels() noexcept {
-  return {value_plain, values_plain, gradient_plain, jet_plain, ranges_plain};
+  return {value_plain, values_plain, gradient_plain, jet_plain, ranges_plain, to_bernstein_plain};
 }
 
 const CubicKernels cubic_kernels = chosen();

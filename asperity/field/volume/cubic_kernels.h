@@ -2,6 +2,8 @@
 // The inner loops of smooth cells: Bernstein form of degree 3 along each axis, a row along x filling the lanes.
 // Each exists twice, from the same source: for every processor, and for those with AVX2, chosen once. Private to field.
 
+#include <array>
+
 #include "asperity/field/volume/cell_polynomial.h"
 
 namespace asperity {
@@ -15,7 +17,13 @@ struct CellRanges {
   Vec3 step_high = Vec3::Constant(-infinity);
 };
 
-/// How cubic cells are evaluated on this processor. [servo]
+/// Weights that turn samples i-1 … i+2 along an axis into the inner two Bernstein coefficients of cell i.
+struct HermiteWeights {
+  double first[4];
+  double second[4];
+};
+
+/// How cubic cells are made and evaluated on this processor. [servo]
 struct CubicKernels {
   double (*value)(const CellPolynomial&, const Vec3&) noexcept;
   void (*values)(const CellPolynomial&, const CellPolynomial::Places&, Lanes&) noexcept;
@@ -23,6 +31,8 @@ struct CubicKernels {
   void (*gradient)(const CellPolynomial&, const Vec3&, FieldJet&) noexcept;
   void (*jet)(const CellPolynomial&, const Vec3&, FieldJet&) noexcept;
   void (*ranges)(const double* coefficients, CellRanges&) noexcept;
+  /// 4 x 4 x 4 samples to coefficients, in place; the weights along each axis.
+  void (*to_bernstein)(const std::array<HermiteWeights, 3>&, double* coefficients) noexcept;
 };
 extern const CubicKernels cubic_kernels;
 /// Those for every processor: what the others are tested against. [any]

@@ -5,6 +5,7 @@
 
 #include "asperity/core/identity.h"
 #include "asperity/core/parallel_for.h"
+#include "asperity/field/volume/cubic_kernels.h"
 
 namespace asperity {
 
@@ -61,12 +62,6 @@ MinMaxOctree build_octree(const ScalarGrid& grid, CellReconstruction reconstruct
   return MinMaxOctree::build(leaves, leaf_cells, std::move(ranges));
 }
 
-/// Weights that turn samples i-1 … i+2 into the inner two Bernstein coefficients of cell i.
-struct HermiteWeights {
-  double first[4];
-  double second[4];
-};
-
 HermiteWeights hermite_weights(const GridAxis& axis, std::uint32_t cell) noexcept {
   double at_start[3];
   double at_end[3];
@@ -78,24 +73,6 @@ HermiteWeights hermite_weights(const GridAxis& axis, std::uint32_t cell) noexcep
 }
 
 constexpr HermiteWeights even_weights{{-1.0 / 6.0, 1.0, 1.0 / 6.0, 0.0}, {0.0, 1.0 / 6.0, 1.0, -1.0 / 6.0}};
-
-/// Samples to coefficients along one axis, for 16 rows.
-template <int Stride, int RowA, int RowB>
-void to_bernstein(const HermiteWeights& w, double* c) noexcept {
-  for (int b = 0; b < 4; ++b) {
-    for (int a = 0; a < 4; ++a) {
-      double* row = c + a * RowA + b * RowB;
-      const double s0 = row[0];
-      const double s1 = row[Stride];
-      const double s2 = row[2 * Stride];
-      const double s3 = row[3 * Stride];
-      row[0] = s1;
-      row[Stride] = w.first[0] * s0 + w.first[1] * s1 + w.first[2] * s2;
-      row[2 * Stride] = w.second[1] * s1 + w.second[2] * s2 + w.second[3] * s3;
-      row[3 * Stride] = s2;
-    }
-  }
-}
 
 }  // namespace
 
@@ -177,12 +154,17 @@ void ScalarField::fetch_samples(const CellIndex& cell, double* out) const noexce
       at[a][n] = std::min(i > Ring ? i - Ring : 0, grid.axis(a).size() - 1);
     }
   }
+  const bool together = at[0][count - 1] - at[0][0] == count - 1;
   std::visit(
       [&](const auto& samples) {
         for (std::uint32_t k = 0; k < count; ++k) {
           for (std::uint32_t j = 0; j < count; ++j) {
             const auto* row = samples.data() + grid.index(0, at[1][j], at[2][k]);
-            for (std::uint32_t i = 0; i < count; ++i) *out++ = static_cast<double>(row[at[0][i]]);
+            if (together) {
+              for (std::uint32_t i = 0; i < count; ++i) *out++ = static_cast<double>(row[at[0][0] + i]);
+            } else {
+              for (std::uint32_t i = 0; i < count; ++i) *out++ = static_cast<double>(row[at[0][i]]);
+            }
           }
         }
       },
@@ -217,13 +199,11 @@ void ScalarField::convert(int level, const CellIndex& cell, CellPolynomial& out)
   const GridAxes& grid_axes = axes(level);
   if (reconstruction_ == CellReconstruction::smooth && sparse_) {
     // Evenly spaced, and constant where it ends.
-    to_bernstein<1, 4, 16>(even_weights, out.coefficient);
-    to_bernstein<4, 1, 16>(even_weights, out.coefficient);
-    to_bernstein<16, 1, 4>(even_weights, out.coefficient);
+    cubic_kernels.to_bernstein({even_weights, even_weights, even_weights}, out.coefficient);
   } else if (reconstruction_ == CellReconstruction::smooth) {
-    to_bernstein<1, 4, 16>(hermite_weights(grid_axes[0], cell.at[0]), out.coefficient);
-    to_bernstein<4, 1, 16>(hermite_weights(grid_axes[1], cell.at[1]), out.coefficient);
-    to_bernstein<16, 1, 4>(hermite_weights(grid_axes[2], cell.at[2]), out.coefficient);
+    cubic_kernels.to_bernstein({hermite_weights(grid_axes[0], cell.at[0]), hermite_weights(grid_axes[1], cell.at[1]),
+                                hermite_weights(grid_axes[2], cell.at[2])},
+                               out.coefficient);
   }
   out.owner = identity_;
   out.cell = cell;

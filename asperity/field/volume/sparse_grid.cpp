@@ -88,6 +88,17 @@ Status check_source(const SparseSource& source) {
   return success();
 }
 
+/// Of a brick's apron, `Count` along each axis.
+template <int Count>
+void copy_nodes(const float* first, double* out) noexcept {
+  for (int k = 0; k < Count; ++k) {
+    for (int j = 0; j < Count; ++j) {
+      const float* row = first + apron_side * (j + apron_side * k);
+      for (int i = 0; i < Count; ++i) *out++ = static_cast<double>(row[i]);
+    }
+  }
+}
+
 /// Two by two, which is faster than one by one.
 using Pair = double __attribute__((vector_size(16)));
 
@@ -454,14 +465,9 @@ void SparseGrid::cell_samples(const std::uint32_t cell[3], int ring, double* out
   const int count = 2 + 2 * ring;
   const std::int32_t entry = table_[table_index(at[0], at[1], at[2])];
   if (entry >= 0) {
-    const float* values = bricks_[static_cast<std::size_t>(entry)]->value;
-    for (int k = 0; k < count; ++k) {
-      for (int j = 0; j < count; ++j) {
-        const float* row = values + apron_index(local[0] - ring, local[1] - ring + j, local[2] - ring + k);
-        for (int i = 0; i < count; ++i) *out++ = static_cast<double>(row[i]);
-      }
-    }
-    return;
+    const float* first = bricks_[static_cast<std::size_t>(entry)]->value +
+                         apron_index(local[0] - ring, local[1] - ring, local[2] - ring);
+    return ring == 0 ? copy_nodes<2>(first, out) : copy_nodes<4>(first, out);
   }
   if (!border) {
     std::fill(out, out + count * count * count, static_cast<double>(constant(entry)));
@@ -573,10 +579,7 @@ Vec3 SparseGrid::clear_gradient(const Vec3& p, SparseHint& hint) const noexcept 
   if (hint.owner == 0) return Vec3::Zero();
   double c[64];
   if (brick != nullptr) {
-    const float* first = brick->value + first_node(place.cell, 1);
-    for_each_in_cube(0, 4, [&](int i, int j, int k) {
-      c[i + 4 * (j + 4 * k)] = static_cast<double>(first[i + apron_side * (j + apron_side * k)]);
-    });
+    copy_nodes<4>(brick->value + first_node(place.cell, 1), c);
   } else {
     far_samples(hint, place, 1, c);
   }

@@ -114,8 +114,8 @@ class Felt {
 
   /// Above 0 outside of what is felt. False beyond the grid's box.
   bool at(const Vec3& p, SurfaceCache& cache, Potential& out) const noexcept {
-    if (!view_.field->contains(p)) return false;
     if (trilinear_) {
+      if (!view_.field->contains(p)) return false;
       out = grid_.trilinear(p, cache.sparse);
     } else {
       FieldJet jet;
@@ -126,12 +126,10 @@ class Felt {
     return true;
   }
   [[nodiscard]] double value(const Vec3& p, SurfaceCache& cache) const noexcept {
-    if (!view_.field->contains(p)) return grid_.outside() - level_;
-    if (trilinear_) return grid_.trilinear(p, cache.sparse).value - level_;
-    const CellIndex cell = view_.field->cell_of(view_.level, p);
-    CellPolynomial& polynomial = cache.cells.slot(view_.field->identity(), view_.level, cell);
-    if (!view_.field->load(view_.level, cell, polynomial)) return grid_.outside() - level_;
-    return polynomial.value(p) - level_;
+    if (trilinear_)
+      return (view_.field->contains(p) ? grid_.trilinear(p, cache.sparse).value : grid_.outside()) - level_;
+    const CellPolynomial* cell = view_.over(p);
+    return (cell != nullptr ? cell->value(p) : grid_.outside()) - level_;
   }
 
  private:

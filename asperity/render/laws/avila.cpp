@@ -72,7 +72,7 @@ LawForce AvilaLaw::force(const TouchedSurface& surface, const Material& material
   Contact& contact = *surface.touch().contact;
   contact.asked = true;
   FieldJet jet;
-  if (!view.field->contains(probe) || !view.sample(probe, jet) || !std::isfinite(jet.value)) {
+  if (!view.sample(probe, jet) || !std::isfinite(jet.value)) {
     contact.seen_outside = false;
     return {};
   }

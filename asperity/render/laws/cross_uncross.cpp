@@ -90,11 +90,8 @@ class GridLine {
 
 /// The field at a point; not-a-number where nothing is known.
 double value_at(const IsoView& view, const Vec3& p) noexcept {
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  if (!view.field->contains(p)) return unknown;
-  const CellIndex cell = view.field->cell_of(view.level, p);
-  CellPolynomial& slot = view.cells->slot(view.field->identity(), view.level, cell);
-  return view.field->load(view.level, cell, slot) ? slot.value(p) : unknown;
+  const CellPolynomial* cell = view.over(p);
+  return cell != nullptr ? cell->value(p) : std::numeric_limits<double>::quiet_NaN();
 }
 
 /// Positive outside, negative inside; not-a-number where nothing is known.

@@ -165,7 +165,7 @@ void reach(Tick& tick) noexcept {
     touch.contact = &contact;
     touch.cache = &tick.cache.of(contact.instance);
   }
-  if (!scene.reads_volumes()) return;
+  if (!scene.reads_bricks()) return;
   tick.level = level_now(tick);
   tick.out.flags.set(TickFlag::coarse_data, tick.level > 0);
   tick.out.level = static_cast<std::uint8_t>(tick.level);

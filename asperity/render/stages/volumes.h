@@ -11,10 +11,10 @@ namespace asperity {
 Box tick_reach(const ScalarField& field, const Pose& pose, const ProxyState& state, const Vec3& probe,
                double probe_radius) noexcept;
 
-/// Calls visit(field, pose) for every volume of a scene, with a surface or without. [servo]
+/// Calls visit(field, pose) for every volume of a scene that reads bricks, with a surface or without. [servo]
 template <class Visit>
 void for_each_volume(const Scene& scene, Visit&& visit) noexcept {
-  if (!scene.reads_volumes()) return;
+  if (!scene.reads_bricks()) return;
   for (const Instance& instance : scene.felt()) {
     if (const IsoSurface* iso = iso_of(instance.surface)) visit(iso->field(), instance.world_from_object);
   }

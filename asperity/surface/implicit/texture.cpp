@@ -291,11 +291,11 @@ class FootFinder {
       const Vec3 v = p - x;
       const double depth = v.dot(normal);
       const Vec3 s = v - depth * normal;
-      if (s.norm() <= at_rest * voxel_) return true;
-      const Mat3 bend = jet.hessian / length;
-      Vec3 step = tangent_step(normal, s, depth, bend);
-      step *= std::min(1.0, voxel_ / step.norm());
-      if (!descend(p, step, 0.5 * step.dot(bend * step) * normal, x)) return true;
+      const double rate = s.norm();
+      if (rate <= at_rest * voxel_) return true;
+      TangentStep to = tangent_step(normal, s, rate, depth, jet.hessian, 1.0 / length);
+      const double share = std::min(1.0, voxel_ / to.step.norm());
+      if (!descend(p, share * to.step, share * share * to.drop * normal, x)) return true;
     }
     return true;
   }

@@ -78,6 +78,13 @@ class Leader {
 
   /// The cells that x lies in or on the border of: `first` … `last` along each axis.
   void find_cells() noexcept {
+    over_ = surface_.cells->around(surface_.field->identity(), surface_.level, x_);
+    if (over_ != nullptr) {
+      std::copy(over_->cell.at, over_->cell.at + 3, first_);
+      std::copy(over_->cell.at, over_->cell.at + 3, last_);
+      std::fill(on_face_, on_face_ + 3, false);
+      return;
+    }
     for (std::size_t a = 0; a < 3; ++a) {
       const GridAxis::Place place = axes_[a].locate(x_[static_cast<int>(a)]);
       first_[a] = last_[a] = place.cell;
@@ -131,7 +138,7 @@ class Leader {
     }
     if (!(length > 0.0)) return false;
     pull.known = true;
-    pull.normal = gradient / length;
+    pull.normal = (1.0 / length) * gradient;
     pull.slope = length;
     pull.outside = (goal_.point - x_).dot(pull.normal) > 0.0;
     const Vec3 goal = goal_.friction > 0.0 ? friction_goal(x_, pull.normal, goal_.point, goal_.friction) : goal_.point;
@@ -148,41 +155,39 @@ class Leader {
   Pull pull_in(const CellIndex& index, int face) noexcept {
     Pull pull;
     pull.cell = index;
-    const CellPolynomial* cell = load(index);
+    const CellPolynomial* cell = over_ != nullptr ? over_ : load(index);
     if (cell == nullptr) return pull;
     // The projection that led here knows the gradient; within a cell the second derivatives mostly change so little
     // that those of the last move serve once more.
-    FieldJet jet;
     const bool arrived = face < 0 && arrived_ && arrived_cell_ == index;
     const auto ask = [&] {
       ++moves_;
-      jet = cell->jet(x_);
-      bend_ = jet.hessian;
+      cell->jet(x_, jet_);
       bend_cell_ = index;
     };
-    if (arrived) {
-      jet.gradient = arrived_gradient_;
-      jet.hessian = bend_;
-    } else {
-      ask();
-    }
+    if (!arrived) ask();
     Vec3 s;
     double depth = 0.0;
     double length = 0.0;
-    if (!aim(*cell, sign_ * jet.gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
+    const Vec3& gradient = arrived ? arrived_gradient_ : jet_.gradient;
+    if (!aim(*cell, sign_ * gradient, face, pull, s, depth, length) || pull.at_rest) return pull;
     // On a face the last step may only have ended too soon.
     const bool within = !on_face_[0] && !on_face_[1] && !on_face_[2];
     if (arrived && within && pull.rate > slow * last_rate_) ask();
     // Newton's step of the distance along the surface; where it is no minimum that it leads to, down the slope.
-    const Mat3 bend = (sign_ / length) * jet.hessian;
+    const double scale = sign_ / length;
     if (face >= 0) {
       const Vec3 along = s / pull.rate;
-      const double a = 1.0 + depth * along.dot(bend * along);
-      pull.step = a > 0.05 ? Vec3(s / a) : s;
+      const double bend = scale * along.dot(jet_.hessian * along);
+      const double a = 1.0 + depth * bend;
+      const double go = a > 0.05 ? pull.rate / a : pull.rate;
+      pull.step = go * along;
+      pull.drop = 0.5 * go * go * bend;
     } else {
-      pull.step = tangent_step(pull.normal, s, depth, bend);
+      const TangentStep to = tangent_step(pull.normal, s, pull.rate, depth, jet_.hessian, scale);
+      pull.step = to.step;
+      pull.drop = to.drop;
     }
-    pull.drop = 0.5 * pull.step.dot(bend * pull.step);
     return pull;
   }
 
@@ -279,7 +284,7 @@ class Leader {
   bool follow(const Pull& pull, int face) noexcept {
     constexpr int most_halvings = 12;
     constexpr int most_hardly = 3;
-    const CellPolynomial* cell = load(pull.cell);
+    const CellPolynomial* cell = over_ != nullptr ? over_ : load(pull.cell);
     const double before = (goal_.point - x_).squaredNorm();
     double share = pull.rate > slow * last_rate_ ? further(pull) : 1.0;
     // Where the last step had to be cut short, this one will have to be too.
@@ -326,6 +331,15 @@ class Leader {
   /// Cuts the way from x to y at the cell's border and brings its end onto the surface there.
   bool arrive(const CellPolynomial& cell, int face, Vec3& y) noexcept {
     bool fixed[3] = {face == 0, face == 1, face == 2};
+    if (face < 0 && cell.has_well_inside(y)) {
+      // Mostly it stays within.
+      const Vec3 start = y;
+      const int moves = moves_;
+      if (!project(cell, fixed, y)) return false;
+      if (cell.has_well_inside(y)) return true;
+      y = start;
+      moves_ = moves;
+    }
     const Vec3 upper = upper_of(cell);
     for (int a = 0; a < 3; ++a) {
       if (fixed[a]) y[a] = x_[a];
@@ -441,11 +455,12 @@ class Leader {
   Vec3& away_;
   Vec3 normal_ = Vec3::Zero();
   int moves_ = 0;
+  const CellPolynomial* over_ = nullptr;  ///< the cell that x lies well inside; none: that is not known
   std::uint32_t first_[3] = {};
   std::uint32_t last_[3] = {};
   std::uint32_t node_[3] = {};  ///< along the axes on whose faces x lies
   bool on_face_[3] = {};
-  Mat3 bend_ = Mat3::Zero();  ///< second derivatives of the last jet, in bend_cell_
+  FieldJet jet_;  ///< the last one, in bend_cell_
   CellIndex bend_cell_;
   double last_rate_ = infinity;    ///< of the pull that was followed last
   Vec3 last_step_ = Vec3::Zero();  ///< of that pull

@@ -50,10 +50,20 @@ struct IsoView {
   CellCache* cells = nullptr;
   WorkMeter* work = nullptr;  ///< as of SurfaceCache
 
+  /// The field over the cell that holds p; none outside the volume and where nothing is known.
+  [[nodiscard]] const CellPolynomial* over(const Vec3& p) const noexcept {
+    if (const CellPolynomial* known = cells->around(field->identity(), level, p)) return known;
+    if (!field->contains(p)) return nullptr;
+    const CellIndex index = field->cell_of(level, p);
+    CellPolynomial& slot = cells->slot(field->identity(), level, index);
+    return field->load(level, index, slot) ? &slot : nullptr;
+  }
   /// Value and gradient of the field itself. False outside the volume and where nothing is known.
   bool sample(const Vec3& p, FieldJet& out) const noexcept {
-    if (!field->contains(p)) return false;
-    return field->sample(level, p, cells->slot(field->identity(), level, field->cell_of(level, p)), out);
+    const CellPolynomial* cell = over(p);
+    if (cell == nullptr) return false;
+    out = cell->gradient(p);
+    return true;
   }
   /// The first place where the motion passes the threshold after fraction `from`, found cell by cell (Amanatides and
   /// Woo 1987) by the exact root of the cell's polynomial (Parker et al. 1998, Marmitt et al. 2004); cells that the
@@ -90,7 +100,10 @@ struct IsoView {
     const std::uint32_t number = cell.at[0] + axes[0].cells() * (cell.at[1] + axes[1].cells() * cell.at[2]);
     return number == no_index ? 0 : number;
   }
-  [[nodiscard]] std::uint32_t element_at(const Vec3& p) const noexcept { return element_of(field->cell_of(level, p)); }
+  [[nodiscard]] std::uint32_t element_at(const Vec3& p) const noexcept {
+    const CellPolynomial* known = cells->around(field->identity(), level, p);
+    return element_of(known != nullptr ? known->cell : field->cell_of(level, p));
+  }
 };
 static_assert(SurfaceView<IsoView>);
 
