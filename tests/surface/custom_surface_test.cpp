@@ -42,6 +42,17 @@ CustomSurface made(T field) {
   return std::move(*surface);
 }
 
+TEST(CustomSurface, DeepInsideABallTheFootIsStraightOut) {
+  // Here all places of the ball are nearly as far: what another start finds may be no nearer than landing is exact.
+  const CustomSurface ball = made(Ball{0.03});
+  for (const Vec3& p : {Vec3(-691, 54, -113), Vec3(300, 0, 1), Vec3(5, -40, 20)}) {
+    const Vec3 place = 5e-6 * p;
+    const Foot foot = ball.view().nearest(place, infinity);
+    ASSERT_TRUE(foot.found());
+    EXPECT_LT((foot.point - 0.03 * place.normalized()).norm(), ball.skin());
+  }
+}
+
 RC_GTEST_PROP(CustomSurface, BallAnswersAsTheParametricSphereDoes, ()) {
   static const CustomSurface ball = made(Ball{0.03});
   ParametricSettings settings;

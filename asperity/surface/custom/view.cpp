@@ -201,7 +201,9 @@ Foot CustomView::nearest(const Vec3& p, double bound, const Place& start) const 
     Place place{0, there.front.dot(p - q) < 0.0, q};
     descend(place, there, {.point = p, .may_leave = false});
     const double distance = (p - there.point).norm();
-    if (!surface_->holds(there.point) || !(distance <= bound) || !(distance < best.distance)) return;
+    // Landing is no more exact than that: where all places are nearly as far, the first one found counts.
+    const double nearer = best.found() ? best.distance - 2.0 * surface_->settled() : infinity;
+    if (!surface_->holds(there.point) || !(distance <= bound) || !(distance < nearer)) return;
     best = foot_at(p, there);
   };
   look_from(p);
