@@ -274,8 +274,8 @@ void carry(Tick& tick) noexcept {
       const IsoSurface* iso = iso_of(instance.surface);
       const int level = std::min(tick.level, iso->field().levels() - 1);
       const double target = iso->threshold_at(tick.probe->time) + ball_level(instance, tick.scene);
-      if (felt_level(*iso, target, touch.facts->sides, level, tick.dt, touch.pose->apply_inverse(state.proxy),
-                     *touch.cache, contact.surface))
+      if (felt_level(*iso, target, touch.facts->sides, level, tick.dt, touch.to_local(state.proxy), *touch.cache,
+                     contact.surface))
         tick.surfaces_moved = true;
     } else if (tick.changed || contact.surface.identity == 0) {
       if (contact.surface.identity != touch.facts->identity) contact.surface = {};
