@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <limits>
 
 namespace asperity {
@@ -12,6 +11,7 @@ namespace asperity {
 namespace {
 
 using Places = CellPolynomial::Places;
+
 /// Of a trilinear cell: what it is along x, y and z, one after the other.
 template <int Order>
 FieldJet linear_jet(const CellPolynomial& cell, const Vec3& p) noexcept {

@@ -293,7 +293,7 @@ class FootFinder {
       const Vec3 s = v - depth * normal;
       const double rate = s.norm();
       if (rate <= at_rest * voxel_) return true;
-      TangentStep to = tangent_step(normal, s, rate, depth, jet.hessian, 1.0 / length);
+      const TangentStep to = tangent_step(normal, s, rate, depth, jet.hessian, 1.0 / length);
       const double share = std::min(1.0, voxel_ / to.step.norm());
       if (!descend(p, share * to.step, share * share * to.drop * normal, x)) return true;
     }
