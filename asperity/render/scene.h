@@ -30,7 +30,8 @@ struct SceneSettings {
   /// How fast coats change their level of detail (levels a second), above 0.
   double level_rate = 8.0;
   /// What a tick may look at, in evaluations of a surface (WorkCount::sum), at least least_budget; 0: no limit. A proxy
-  /// that is not at rest by then goes on from where it is in the next tick (work_left). Without a value budget_for.
+  /// that is not at rest by then goes on from where it is in the next tick (work_left). Where that is also hangs on how
+  /// a mesh's tree was cut, which no other force does. Without a value budget_for.
   std::optional<std::uint32_t> budget = {};
   static constexpr std::uint32_t least_budget = 100;
   /// For a point 40 to 60 us; a ball's single searches take more than any such budget: none. [any]

@@ -12,7 +12,6 @@
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
-#include "asperity/geometry/mesh_refitter.h"
 #include "asperity/geometry/triangle_index.h"
 #include "tests/geometry/random_meshes.h"
 
@@ -403,14 +402,6 @@ TEST(TriangleIndex, NoAnswerDependsOnWhatAPatchHolds) {
   EXPECT_GT(several, 1000);
 }
 
-/// The same triangles at the same places in a tree that was cut for a squeezed mesh.
-TriangleIndex otherwise_cut(const TriangleMesh& mesh, SearchStructure structure) {
-  std::vector<Vec3> squeezed;
-  for (const Vec3& p : mesh.positions()) squeezed.emplace_back(0.2 * p.x() + 0.3 * p.z(), 3.0 * p.y(), p.z());
-  MeshRefitter refitter(TriangleIndex::build(mesh.moved(squeezed).value(), structure));
-  return refitter.moved(mesh.positions()).value();
-}
-
 // A tree is a way to find things: which triangle an answer names where several are as near is not its to say.
 TEST(TriangleIndex, NoAnswerDependsOnHowTheTreeIsCut) {
   Rng rng(23);
@@ -419,7 +410,7 @@ TEST(TriangleIndex, NoAnswerDependsOnHowTheTreeIsCut) {
   all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
   int hits = 0;
   for (const TriangleMesh& mesh : all) {
-    const TriangleIndex indices[] = {TriangleIndex::build(mesh), otherwise_cut(mesh, SearchStructure::bvh),
+    const TriangleIndex indices[] = {TriangleIndex::build(mesh), test::otherwise_cut(mesh),
                                      TriangleIndex::build(mesh, SearchStructure::octree)};
     const double edge = mesh.mean_edge();
     for (int i = 0; i < 300; ++i) {

@@ -6,11 +6,20 @@
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/geometry/mesh.h"
+#include "asperity/geometry/mesh_refitter.h"
 
 namespace asperity::test {
 
 inline Vec3 random_point(Rng& rng, double size) {
   return {rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)};
+}
+
+inline Vec3 random_direction(Rng& rng) {
+  for (;;) {
+    const Vec3 v = random_point(rng, 1.0);
+    const double length = v.norm();
+    if (length > 0.1 && length <= 1.0) return v / length;
+  }
 }
 
 /// Unrelated triangles in a cube of half-width 1, of many sizes; every fourth a sliver with an aspect of up to 1e5.
@@ -81,6 +90,28 @@ inline MeshSource mesh_of_kind(int kind, std::uint64_t seed) {
     case 6: return trial_mesh_c({6, 12, 0.2});
     default: return trial_mesh_f(24, 0.1);  // sizes over three decades
   }
+}
+
+/// The same triangles at the same places in a tree that was cut for a squeezed mesh.
+inline TriangleIndex otherwise_cut(const TriangleMesh& mesh, SearchStructure structure = SearchStructure::bvh) {
+  std::vector<Vec3> squeezed;
+  for (const Vec3& p : mesh.positions()) squeezed.emplace_back(0.2 * p.x() + 0.3 * p.z(), 3.0 * p.y(), p.z());
+  MeshRefitter refitter(TriangleIndex::build(mesh.moved(squeezed).value(), structure));
+  return refitter.moved(mesh.positions()).value();
+}
+
+/// Three closed blobs of a size through one another.
+inline MeshSource overlapping_blobs(Rng& rng, double size) {
+  MeshSource source = random_closed_mesh(rng.next(), 3, size, 0.2);
+  for (int more = 0; more < 2; ++more) {
+    const MeshSource other = random_closed_mesh(rng.next(), 3, size, 0.2);
+    const auto first = static_cast<std::uint32_t>(source.positions.size());
+    const Vec3 aside = 0.2 * size * random_direction(rng);
+    for (const Vec3& p : other.positions) source.positions.emplace_back(p + aside);
+    for (const auto& [a, b, c] : other.triangles) source.triangles.push_back({first + a, first + b, first + c});
+  }
+  source.corner_uvs.clear();
+  return source;
 }
 
 }  // namespace asperity::test

@@ -7,11 +7,13 @@
 
 #include "asperity/core/rng.h"
 #include "asperity/geometry/generators.h"
-#include "asperity/geometry/mesh_refitter.h"
 #include "asperity/render/step.h"
+#include "tests/geometry/random_meshes.h"
 
 namespace asperity::god_object_test {
 namespace {
+
+using test::random_direction;
 
 constexpr double stiffness = 1000.0;
 constexpr Seconds tick(1e-3);
@@ -39,14 +41,6 @@ ProbeSample at(const Vec3& position) {
 
 double random_sign(Rng& rng) {
   return rng.uniform() < 0.5 ? -1.0 : 1.0;
-}
-
-Vec3 random_direction(Rng& rng) {
-  for (;;) {
-    const Vec3 v(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
-    const double length = v.norm();
-    if (length > 0.1 && length <= 1.0) return v / length;
-  }
 }
 
 /// Largest angle between adjacent faces (rad).
@@ -152,22 +146,9 @@ TEST(GodObject, ForcesDoNotDependOnHowTheTreeIsCut) {
   Rng rng(29);
   int touching = 0;
   for (int m = 0; m < 12; ++m) {
-    MeshSource source = random_closed_mesh(rng.next(), 3, 0.05, 0.2);
-    for (int more = 0; more < 2; ++more) {
-      const MeshSource other = random_closed_mesh(rng.next(), 3, 0.05, 0.2);
-      const auto first = static_cast<std::uint32_t>(source.positions.size());
-      const Vec3 aside = 0.01 * random_direction(rng);
-      for (const Vec3& p : other.positions) source.positions.emplace_back(p + aside);
-      for (const auto& [a, b, c] : other.triangles) source.triangles.push_back({first + a, first + b, first + c});
-    }
-    source.corner_uvs.clear();
-    const TriangleMesh mesh = TriangleMesh::build(std::move(source)).value();
-    std::vector<Vec3> squeezed;
-    for (const Vec3& p : mesh.positions()) squeezed.emplace_back(0.2 * p.x() + 0.3 * p.z(), 3.0 * p.y(), p.z());
-    MeshRefitter refitter(TriangleIndex::build(mesh.moved(squeezed).value()));
-    const Scene scenes[] = {
-        scene_of(std::make_shared<const MeshSurface>(TriangleIndex::build(mesh)), 0.0),
-        scene_of(std::make_shared<const MeshSurface>(refitter.moved(mesh.positions()).value()), 0.0)};
+    const TriangleMesh mesh = TriangleMesh::build(test::overlapping_blobs(rng, 0.05)).value();
+    const Scene scenes[] = {scene_of(std::make_shared<const MeshSurface>(TriangleIndex::build(mesh)), 0.0),
+                            scene_of(std::make_shared<const MeshSurface>(test::otherwise_cut(mesh)), 0.0)};
     ProxyState states[2];
     Vec3 probe = 0.1 * random_direction(rng);
     Vec3 heading = -probe.normalized();

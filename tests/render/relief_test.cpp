@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "tests/geometry/random_meshes.h"
 #include "tests/render/analytic_relief.h"
+#include "tests/surface/reliefs.h"
 
 namespace asperity::test::relief_test {
 namespace {
@@ -80,6 +82,38 @@ TEST(ReliefTruth, displaced_sphere_on_a_coarse_base) {
     EXPECT_LE(truth.largest, 3.0);
     EXPECT_LE(truth.jump, 1.3 * truth.exact_jump);
   }
+}
+
+// A tree is a way to find faces: no force hangs on how it was cut. Without a budget, of which looking takes some more
+// or less.
+TEST(ReliefTruth, forces_do_not_depend_on_how_the_tree_is_cut) {
+  Rng rng(31);
+  int touching = 0;
+  for (int m = 0; m < 6; ++m) {
+    const TriangleMesh mesh = mesh_of(overlapping_blobs(rng, 0.05));
+    const auto first = relief_on(mesh, {tiled(wavy_map(3e-3, 16), 0.01)}, {Mapping::triplanar});
+    const auto other = std::make_shared<const ReliefSurface>(MeshSurface(otherwise_cut(mesh)), first->coat());
+    std::vector<Scene> scenes;
+    for (const auto& relief : {first, other}) {
+      Instance instance;
+      instance.surface = relief;
+      instance.sides = Sides::front;
+      instance.material.stiffness = stiffness;
+      scenes.push_back(must(Scene::build({instance}, {.budget = 0})));
+    }
+    ProxyState states[2];
+    Vec3 probe = 0.1 * random_direction(rng);
+    Vec3 heading = -probe.normalized();
+    for (int i = 0; i < 4000; ++i) {
+      if (rng.below(30) == 0)
+        heading = (random_direction(rng) - 20.0 * (probe.norm() - 0.05) * probe.normalized()).normalized();
+      probe += 2e-4 * heading;
+      const Vec3 force = touch(scenes[0], states[0], probe).wrench.force;
+      touching += force.isZero(0.0) ? 0 : 1;
+      ASSERT_EQ(touch(scenes[1], states[1], probe).wrench.force, force) << "mesh " << m << ", tick " << i;
+    }
+  }
+  EXPECT_GT(touching, 5000);
 }
 
 }  // namespace

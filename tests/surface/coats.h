@@ -14,6 +14,7 @@
 #include "asperity/field/mesostructure/generators.h"
 #include "asperity/geometry/generators.h"
 #include "asperity/surface/relief/surface.h"
+#include "tests/geometry/random_meshes.h"
 
 namespace asperity::test {
 
@@ -83,14 +84,6 @@ inline std::shared_ptr<const ReliefSurface> coated(MeshSource source, HeightMap 
 
 inline Vec3 random_vector(Rng& rng, double size) {
   return {rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)};
-}
-
-inline Vec3 random_direction(Rng& rng) {
-  for (;;) {
-    const Vec3 v = random_vector(rng, 1.0);
-    const double length = v.norm();
-    if (length > 0.1 && length <= 1.0) return v / length;
-  }
 }
 
 /// Barycentric coordinates inside a triangle, each at least `margin`.

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "asperity/surface/relief/view.h"
+#include "tests/geometry/random_meshes.h"
 #include "tests/surface/balls.h"
 #include "tests/surface/reliefs.h"
 
@@ -220,6 +221,30 @@ TEST(ReliefSearch, caches_change_no_answer) {
       ASSERT_EQ(one_hit.t, other.t) << one.name;
       ASSERT_EQ(one_hit.contact.element, other.contact.element) << one.name;
     }
+  }
+}
+
+// A tree is a way to find faces: the order in which it does must not tell.
+TEST(ReliefSearch, no_motion_is_stopped_by_how_the_tree_is_cut) {
+  Rng rng(78);
+  for (const Searched& one : reliefs()) {
+    const ReliefSurface other(MeshSurface(otherwise_cut(one.surface->base().mesh())), one.surface->coat());
+    SurfaceCache caches[2];
+    int met = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3 from = random_near(rng, one.dense.index.mesh(), 2e-3);
+      const Segment motion{from, from + std::pow(10.0, rng.uniform(-4.0, -1.5)) * random_direction(rng)};
+      const std::uint32_t starts_on =
+          i % 2 == 0 ? no_index : one.surface->view(caches[0]).nearest(from, infinity).element;
+      const SweptHit hit = one.surface->view(caches[0]).first_touch(motion, Sides::both, starts_on);
+      const SweptHit again = other.view(caches[1]).first_touch(motion, Sides::both, starts_on);
+      met += hit.hit ? 1 : 0;
+      ASSERT_EQ(again.hit, hit.hit) << one.name << ", motion " << i;
+      ASSERT_EQ(again.t, hit.t) << one.name << ", motion " << i;
+      ASSERT_EQ(again.contact.element, hit.contact.element) << one.name << ", motion " << i;
+      ASSERT_EQ(again.contact.at, hit.contact.at) << one.name << ", motion " << i;
+    }
+    EXPECT_GT(met, 400) << one.name;
   }
 }
 

@@ -115,13 +115,15 @@ class PatchRay {
     return *frame_;
   }
 
-  PatchHit first() noexcept {
+  /// The first hit, if it is no later than `limit`: what is looked at on the way there does not depend on that.
+  PatchHit first(double limit) noexcept {
     PatchHit best;
     Piece stack[deepest_part + 3];
     int top = 0;
     stack[top++] = {at(part_.from, guess(part_.from)), at(part_.to, guess(part_.to)), 0, first_look()};
     while (top > 0) {
       Piece piece = stack[--top];
+      if (piece.from.t > limit) break;
       if (piece.look > 0.0 && split_off_look(piece, stack[top])) ++top;
       Share share;
       ShellPlace bend;
@@ -614,15 +616,19 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
   if (!(way.squaredNorm() > 0.0)) return best;
   ReliefPlace place;
   WorkCount count;
+  // The others are looked at in an order that the tree decides: what each of them answers must not depend on those
+  // before it.
+  double end = 1.0;
   const auto look_at = [&](std::uint32_t face) {
     if (skip(face)) return best.t;
     HullPart part;
     const ShellPrism prism = surface_->shell().prism(surface_->base().mesh(), face);
-    if (!clip_to_hull(*surface_, face, prism, motion, best.t, part)) return best.t;
+    if (!clip_to_hull(*surface_, face, prism, motion, end, part) || part.from > best.t) return best.t;
     PatchRay ray(*surface_, face, prism, moment_, motion, sides, part, starts_on != no_index);
-    const PatchHit hit = ray.first();
+    const PatchHit hit = ray.first(best.t);
     count += ray.count();
-    if (hit.t < best.t || (!best.hit && hit.t <= 1.0)) {
+    const bool earlier = hit.t < best.t || (hit.t == best.t && (!best.hit || face < place.frame.face));
+    if (hit.t <= 1.0 && earlier) {
       best.hit = true;
       best.t = hit.t;
       place = {ray.frame(), std::clamp(hit.u, 0.0, 1.0), std::clamp(hit.v, 0.0, 1.0)};
@@ -630,7 +636,7 @@ SweptHit ReliefView::first_met(const Segment& motion, Sides sides, const Skip& s
     }
     return best.t;
   };
-  if (likely != no_index) look_at(likely);
+  if (likely != no_index) end = std::min(end, look_at(likely));
   // Nearly all motions are far shorter than a face: the neighbourhood decides.
   surface_->base().index().for_each_along(motion, surface_->boxes(),
                                           [&](std::uint32_t face) { return face == likely ? best.t : look_at(face); });
