@@ -300,6 +300,7 @@ TEST(GodObject, OnEdgesAndAtVerticesItIsHeldAsByAllThatItTouches) {
   Rng rng(6);
   int ticks = 0;
   int differ = 0;
+  int not_at_rest = 0;
   int on_edge = 0;
   int at_vertex = 0;
   for (int m = 0; m < 12; ++m) {
@@ -338,10 +339,13 @@ TEST(GodObject, OnEdgesAndAtVerticesItIsHeldAsByAllThatItTouches) {
       EXPECT_TRUE(same || slips || distance < of_all)
           << "mesh " << m << ", tick " << i << ", " << places << " places: " << distance << " in place of " << of_all
           << " m from the probe";
-      ASSERT_EQ(unfinished(force.flags), unfinished(expected.flags)) << "mesh " << m << ", tick " << i;
+      ASSERT_FALSE(unfinished(force.flags)) << "mesh " << m << ", tick " << i;
+      // Led by all planes it may go to and fro at a vertex between places that only rounding tells apart.
+      not_at_rest += unfinished(expected.flags) ? 1 : 0;
     }
   }
   EXPECT_LE(differ, ticks / 1000);
+  EXPECT_LE(not_at_rest, ticks / 10000);
   EXPECT_GT(on_edge, 2000);
   EXPECT_GT(at_vertex, 500);
 }

@@ -44,6 +44,12 @@ const std::vector<Searched>& reliefs() {
     add("cup", trial_mesh_e(3, std::numbers::pi / 2.0, 0.01), 5e-4, Mapping::triplanar, FoldMode::keep, 50);
     add("cone", cone(24, 0.02, 0.008), 4e-4, Mapping::triplanar, FoldMode::keep, 60);
     add("blob", random_closed_mesh(4, 1, 0.02, 0.4), 5e-4, Mapping::triplanar, FoldMode::keep, 60);
+    // Every texel another height.
+    Rng rng(80);
+    const HeightMap rough = map_of(32, [&](double, double) { return rng.uniform(-3e-4, 3e-4); });
+    auto surface = relief_on(mesh_of(icosphere(1, 0.02)), {tiled(rough)}, {Mapping::triplanar});
+    Tessellation dense = dense_net(*surface, 240);
+    made.push_back({"rough sphere", std::move(surface), std::move(dense)});
     return made;
   }();
   return all;
@@ -246,6 +252,95 @@ TEST(ReliefSearch, no_motion_is_stopped_by_how_the_tree_is_cut) {
     }
     EXPECT_GT(met, 400) << one.name;
   }
+}
+
+/// Distance of p to a face's relief, the least around a place of it: by trying, in ever smaller steps.
+double least_around(const ReliefSurface& surface, const ReliefFrame& frame, Vec2 at, double step, const Vec3& p) {
+  const auto distance = [&](const Vec2& uv) { return (surface.point(frame, uv.x(), uv.y()).point - p).norm(); };
+  double best = distance(at);
+  while (step > 1e-10) {
+    bool better = false;
+    for (int way = 0; way < 16; ++way) {
+      const double turn = 2.0 * std::numbers::pi * way / 16.0;
+      const Vec2 there = at + step * Vec2(std::cos(turn), std::sin(turn));
+      if (there.minCoeff() < 0.0 || there.sum() > 1.0) continue;
+      const double now = distance(there);
+      if (now >= best) continue;
+      best = now;
+      at = there;
+      better = true;
+      break;
+    }
+    if (!better) step *= 0.6;
+  }
+  return best;
+}
+
+TEST(ReliefSearch, feet_are_all_places_that_a_ball_may_rest_on) {
+  Rng rng(79);
+  int several = 0;
+  for (const Searched& one : reliefs()) {
+    const ReliefSurface& surface = *one.surface;
+    const TriangleMesh& dense = one.dense.index.mesh();
+    const TriangleMesh& base = surface.base().mesh();
+    const auto cells = static_cast<std::size_t>(dense.triangles().size() / base.triangles().size());
+    SurfaceCache cache;
+    int missed = 0;
+    int expected = 0;
+    for (int i = 0; i < 150; ++i) {
+      const double reach = std::pow(10.0, rng.uniform(-3.5, -1.9));
+      // Some of them as near as something can be and not be in reach.
+      Vec3 p = random_near(rng, dense, reach);
+      const Foot nearest = surface.view(cache).nearest(p, infinity);
+      if (i % 3 == 0) p = nearest.point + rng.uniform(0.999, 1.0) * reach * (p - nearest.point).normalized();
+      ContactSet feet;
+      surface.view(cache).feet(p, reach, feet);
+      several += feet.size() > 1 ? 1 : 0;
+      // Each of them is one: nothing around it is nearer.
+      for (const Foot& foot : feet) {
+        const ReliefFrame frame = surface.frame(foot.element);
+        ASSERT_LT((surface.point(frame, foot.at[1], foot.at[2]).point - foot.point).norm(), 1e-12) << one.name;
+        ASSERT_NEAR((foot.point - p).norm(), foot.distance, 1e-12);
+        ASSERT_LE(foot.distance, reach);
+        const double around = least_around(surface, frame, {foot.at[1], foot.at[2]}, 1e-4, p);
+        ASSERT_LE(foot.distance - around, 1e-6 * reach) << one.name << ", case " << i;
+      }
+      for (std::size_t k = 1; k < feet.size(); ++k) ASSERT_GE(feet[k].distance, feet[k - 1].distance);
+      // And every corner of the dense mesh that is nearer than those around it lies beside one.
+      if (feet.size() == feet.capacity()) continue;
+      for (std::uint32_t vertex = 0; vertex < dense.positions().size(); ++vertex) {
+        const double here = (dense.positions()[vertex] - p).norm();
+        if (here > reach) continue;
+        bool least = true;
+        double spacing = 0.0;
+        for (const std::uint32_t face : dense.faces_of_vertex(vertex)) {
+          for (const std::uint32_t other : dense.triangles()[face]) {
+            spacing = std::max(spacing, (dense.positions()[other] - dense.positions()[vertex]).norm());
+            least = least && here <= (dense.positions()[other] - p).norm();
+          }
+        }
+        if (!least) continue;
+        double closest = infinity;
+        for (const Foot& foot : feet) closest = std::min(closest, (foot.point - dense.positions()[vertex]).norm());
+        ++expected;
+        if (closest <= 3.0 * spacing) continue;
+        // Unless what it lies beside leads farther down.
+        const auto on = static_cast<std::uint32_t>(dense.faces_of_vertex(vertex)[0] / cells);
+        const ReliefFrame frame = surface.frame(on);
+        ShellPlace place;
+        if (!frame.prism.invert_anew(dense.positions()[vertex], place)) continue;
+        const double least_there = least_around(surface, frame, {place.u, place.v}, 1e-3, p);
+        const bool known = std::any_of(feet.begin(), feet.end(),
+                                       [&](const Foot& foot) { return foot.distance <= least_there + 1e-6 * reach; });
+        missed += known ? 0 : 1;
+        EXPECT_TRUE(known) << one.name << ", case " << i << ": " << least_there << " of " << reach << ", "
+                           << feet.size() << " feet, face " << on;
+      }
+    }
+    EXPECT_GT(expected, 30) << one.name;
+    EXPECT_EQ(missed, 0) << one.name;
+  }
+  EXPECT_GT(several, 100);
 }
 
 TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {

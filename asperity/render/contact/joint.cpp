@@ -79,6 +79,33 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
   return true;
 }
 
+/// Of a relief, planes that keep the ball off all that it touches or would on the next step from here.
+const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position) noexcept {
+  const double beyond = std::clamp(stride_, 0.02 * radius_, 0.25 * radius_);
+  if (last_feet_.index == index && last_feet_.position == position && last_feet_.beyond == beyond)
+    return last_feet_.planes;
+  last_feet_.index = index;
+  last_feet_.position = position;
+  last_feet_.beyond = beyond;
+  last_feet_.planes.clear();
+  Entry& entry = entries_[index];
+  const Touched& touch = *entry.touch;
+  const auto& view = *std::get_if<ReliefView>(&touch.view);
+  const Vec3 local = touch.to_local(position);
+  ContactSet feet;
+  view.feet(local, radius_ + gap(entry) + 2.0 * entry.skin + beyond, feet);
+  for (const Foot& foot : feet) {
+    const Vec3 way = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
+    const Place place{foot.element, way.dot(view.front(foot)) < 0.0, foot.at};
+    if (&foot == feet.begin()) entry.near = place;
+    if (place.back && touch.facts->sides == Sides::front) continue;
+    const Vec3 normal = touch.turned(way);
+    last_feet_.planes.push_back({normal, normal.dot(touch.to_world(foot.point)) + radius_, gap(entry),
+                                 static_cast<std::uint32_t>(index), foot});
+  }
+  return last_feet_.planes;
+}
+
 void JointSolve::remember(const ConstraintPlane& plane) noexcept {
   // One plane a direction: the newest.
   constexpr double same_direction = 0.999;
@@ -126,6 +153,10 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
+    if (tells_all_feet(entry)) {
+      for (const ConstraintPlane& plane : feet_planes(i, position)) out.push_back(plane);
+      continue;
+    }
     if (entry.smooth) {
       ConstraintPlane plane;
       if (!foot_plane(i, position, plane)) continue;
@@ -215,8 +246,21 @@ bool JointSolve::push_out(Vec3& position) noexcept {
   PlaneSet held;
   for (int push = 0; push < most_pushes; ++push) {
     bool clear = true;
+    // Of those that tell all, what is there now.
+    for (std::size_t k = held.size(); k-- > 0;) {
+      if (tells_all_feet(entries_[held[k].owner])) held.swap_remove(k);
+    }
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       if (!entries_[i].smooth) continue;
+      if (tells_all_feet(entries_[i])) {
+        for (const ConstraintPlane& foot : feet_planes(i, position)) {
+          if (!held.push_back(foot)) return false;
+          if (foot.offset + foot.skin - foot.normal.dot(position) <= 0.25 * entries_[i].skin) continue;
+          remember(foot);
+          clear = false;
+        }
+        continue;
+      }
       ConstraintPlane plane;
       if (!foot_plane(i, position, plane)) continue;
       remember(plane);
@@ -348,7 +392,9 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
 
 /// Among surfaces of which some are smooth: only ever nearer to the goal.
 void JointSolve::settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept {
-  constexpr int most_moves = 160;
+  // Where each move shows all that the ball touches there are few.
+  const bool all = std::all_of(entries_.begin(), entries_.end(), [&](const Entry& one) { return tells_all_feet(one); });
+  const int most_moves = all ? 48 : 160;
   Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
   for (int move = 0; move < most_moves && !work_.spent(); ++move) {
     solution.planes.clear();

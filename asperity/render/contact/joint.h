@@ -129,7 +129,12 @@ class JointSolve {
   void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
 
+  /// Whether all places that a ball may rest on are asked for at once.
+  [[nodiscard]] bool tells_all_feet(const Entry& entry) const noexcept {
+    return radius_ > 0.0 && entry.smooth && std::holds_alternative<ReliefView>(entry.touch->view);
+  }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
+  [[nodiscard]] const PlaneSet& feet_planes(std::size_t index, const Vec3& position) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
   /// Those of them that are touched, not only near: what friction can hold by.
   void rests_on(const Vec3& position, PlaneSet& out) noexcept;
@@ -154,6 +159,13 @@ class JointSolve {
   GeneratedPatches* patches_;
   const WorkMeter& work_;
   FixedVector<Entry, most_contacts> entries_;
+  /// What feet_planes has answered last: a position is asked about again where the ball comes to be there.
+  struct LastFeet {
+    std::size_t index = no_owner;
+    Vec3 position = Vec3::Zero();
+    double beyond = 0.0;
+    PlaneSet planes;
+  } last_feet_;
   FixedVector<ConstraintPlane, 6> feet_;  ///< found while the ball moved
   bool met_ = false;                      ///< the last advance has found more of them
   double stride_ = 0.0;                   ///< how far that was to go (m)

@@ -111,24 +111,13 @@ class ReliefNearestSearch {
   }
 
  private:
-  /// Around the places of a face that can come within the distance of the point: what is that near to it has shell
-  /// coordinates that near to its own. False where these are not known well enough, or that is most of the face.
+  /// Around the places of a face that can come within the distance of the point. False where that is most of the face.
   bool window(const ReliefFrame& frame, Part& part) const noexcept {
     constexpr double most = 0.2;
-    const ShellPrism& prism = frame.prism;
-    const Vec3 coordinates = PlaneFrame(prism).turned(p_ - prism.corner);
-    ShellPlace place{coordinates.x(), coordinates.y(), coordinates.z()};
-    // Far from the face it is large in any case.
-    if (!(coordinates.cwiseAbs().head<2>().maxCoeff() < 3.0) || !prism.invert(p_, place)) return false;
-    const ShellGradients by = shell_gradients(prism, place);
-    const double u = by.u.norm();
-    const double v = by.v.norm();
-    // By how much the shell's Jacobian may change on the way, as a share of itself: then coordinates change by at most
-    // twice what they do here.
-    const double change = 4.0 * distance_ * by.height.norm() * (u * prism.turn_u.norm() + v * prism.turn_v.norm());
-    const Vec2 reach = 2.0 * distance_ * Vec2(u, v) + Vec2::Constant(1e-12);
-    if (!(change <= 0.25 && reach.maxCoeff() <= most)) return false;
-    const Vec2 lower = Vec2(place.u, place.v) - reach;
+    Vec2 middle;
+    Vec2 reach;
+    if (!places_within(frame.prism, p_, distance_, middle, reach) || reach.maxCoeff() > most) return false;
+    const Vec2 lower = middle - reach;
     part = whole();
     part.corner[0] = lower;
     part.corner[1] = lower + Vec2(4.0 * reach.x(), 0.0);

@@ -12,28 +12,34 @@ namespace asperity {
 inline constexpr double leaf_of_texel = 0.5;
 inline constexpr int deepest_part = 18;
 
-/// How often a triangle has to be split to be as small as a leaf. [servo]
-inline int leaf_level(const ReliefFrame& frame) noexcept {
+/// Texels along a triangle's edge, the most of the three. [servo]
+inline double texels_across(const ReliefFrame& frame) noexcept {
   const HeightMap& map = frame.coat.maps->heights();
-  double texels = 0.0;
   if (frame.coat.triplanar) {
     const Vec2& tile = frame.coat.maps->tile();
     const double per = std::max(map.width() / tile.x(), map.height() / tile.y());
-    texels = per * std::max({frame.coat.point_u.cwiseAbs().maxCoeff(), frame.coat.point_v.cwiseAbs().maxCoeff(),
-                             (frame.coat.point_u - frame.coat.point_v).cwiseAbs().maxCoeff()});
-  } else {
-    const auto span = [&](const Vec2& st) {
-      return std::max(std::abs(st.x()) * map.width(), std::abs(st.y()) * map.height());
-    };
-    texels = std::max({span(frame.coat.st_u), span(frame.coat.st_v), span(frame.coat.st_u - frame.coat.st_v)});
+    return per * std::max({frame.coat.point_u.cwiseAbs().maxCoeff(), frame.coat.point_v.cwiseAbs().maxCoeff(),
+                           (frame.coat.point_u - frame.coat.point_v).cwiseAbs().maxCoeff()});
   }
+  const auto span = [&](const Vec2& st) {
+    return std::max(std::abs(st.x()) * map.width(), std::abs(st.y()) * map.height());
+  };
+  return std::max({span(frame.coat.st_u), span(frame.coat.st_v), span(frame.coat.st_u - frame.coat.st_v)});
+}
+
+// Even the flattest map is bent where faces are joined.
+inline constexpr int least_level = 2;
+inline constexpr int least_level_stitched = 5;
+
+/// How often a triangle has to be split to be as small as a leaf. [servo]
+inline int leaf_level(const ReliefFrame& frame) noexcept {
+  double texels = texels_across(frame);
   int level = 0;
   while (level < deepest_part && texels > leaf_of_texel) {
     texels *= 0.5;
     ++level;
   }
-  // Even the flattest map is bent where faces are joined.
-  return std::max(level, frame.stitched ? 5 : 2);
+  return std::max(level, frame.stitched ? least_level_stitched : least_level);
 }
 
 /// The triangle's own affine frame: barycentric (u, v) of the projection, height over the plane.
@@ -52,6 +58,24 @@ struct PlaneFrame {
     return {gradient_u.dot(vector), gradient_v.dot(vector), normal.dot(vector)};
   }
 };
+
+/// Around the places over a face that can come within a distance (m) of a point: what is that near to it has shell
+/// coordinates that near to its own. False where these are not known well enough. [servo]
+inline bool places_within(const ShellPrism& prism, const Vec3& p, double distance, Vec2& middle, Vec2& reach) noexcept {
+  const Vec3 coordinates = PlaneFrame(prism).turned(p - prism.corner);
+  ShellPlace place{coordinates.x(), coordinates.y(), coordinates.z()};
+  // Far from the face it is large in any case.
+  if (!(coordinates.cwiseAbs().head<2>().maxCoeff() < 3.0) || !prism.invert(p, place)) return false;
+  const ShellGradients by = shell_gradients(prism, place);
+  const double u = by.u.norm();
+  const double v = by.v.norm();
+  // By how much the shell's Jacobian may change on the way, as a share of itself: then coordinates change by at most
+  // twice what they do here.
+  const double change = 4.0 * distance * by.height.norm() * (u * prism.turn_u.norm() + v * prism.turn_v.norm());
+  middle = {place.u, place.v};
+  reach = 2.0 * distance * Vec2(u, v) + Vec2::Constant(1e-12);
+  return change <= 0.25;
+}
 
 /// [servo]
 inline Foot foot_at(const ReliefPlace& place, const ReliefPoint& spot, const Vec3& p) noexcept {
