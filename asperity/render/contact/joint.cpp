@@ -392,9 +392,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
 
 /// Among surfaces of which some are smooth: only ever nearer to the goal.
 void JointSolve::settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept {
-  // Where each move shows all that the ball touches there are few.
-  const bool all = std::all_of(entries_.begin(), entries_.end(), [&](const Entry& one) { return tells_all_feet(one); });
-  const int most_moves = all ? 48 : 160;
+  constexpr int most_moves = 160;
   Vec3 refused = Vec3::Constant(infinity);  // where the last advance could not go
   for (int move = 0; move < most_moves && !work_.spent(); ++move) {
     solution.planes.clear();
