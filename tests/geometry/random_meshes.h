@@ -114,4 +114,11 @@ inline MeshSource overlapping_blobs(Rng& rng, double size) {
   return source;
 }
 
+/// Leads a probe about at random, in and out of what lies `radius` around the origin, by 0.2 mm.
+inline void wander(Rng& rng, double radius, Vec3& probe, Vec3& heading) {
+  if (rng.below(30) == 0)
+    heading = (random_direction(rng) - 20.0 * (probe.norm() - radius) * probe.normalized()).normalized();
+  probe += 2e-4 * heading;
+}
+
 }  // namespace asperity::test

@@ -230,7 +230,7 @@ TEST(BudgetOfATick, a_probe_drawn_back_onto_the_surface_is_not_flown_to_and_fro)
   for (int i = 0; i < 20000; ++i) {
     const Vec3 out = random_direction(rng);
     ProxyState aside;
-    const ForceSample there = pressed((out + 0.02 * random_vector(rng, 1.0)).normalized(), aside);
+    const ForceSample there = pressed((out + 0.02 * random_point(rng, 1.0)).normalized(), aside);
     ProxyState state;
     ProxyCache cache;
     pressed(out, state);

@@ -35,7 +35,7 @@ Vec3 dual_ascent(const Vec3& goal, const PlaneSet& planes) {
 /// Planes that all leave a ball of 0.1 around some point free.
 PlaneSet random_feasible_planes(Rng& rng, std::uint32_t most) {
   PlaneSet planes;
-  const Vec3 inside = random_vector(rng, 1.0);
+  const Vec3 inside = random_point(rng, 1.0);
   const std::uint32_t count = rng.below(most + 1);
   for (std::uint32_t i = 0; i < count; ++i) {
     const Vec3 normal = random_direction(rng);
@@ -60,7 +60,7 @@ void expect_optimal(const Vec3& goal, const PlaneSet& planes, const PlaneProject
 RC_GTEST_PROP(ProjectOntoPlanes, answers_the_optimum_of_random_sets, (std::uint64_t seed)) {
   Rng rng(seed);
   const PlaneSet planes = random_feasible_planes(rng, 8);
-  const Vec3 goal = random_vector(rng, 2.0);
+  const Vec3 goal = random_point(rng, 2.0);
   const PlaneProjection answer = project_onto_planes(goal, planes, false);
   RC_ASSERT(answer.feasible);
   // Nearly parallel planes meet far away: their corner carries the rounding of that.
@@ -70,7 +70,7 @@ RC_GTEST_PROP(ProjectOntoPlanes, answers_the_optimum_of_random_sets, (std::uint6
 RC_GTEST_PROP(ProjectOntoPlanes, agrees_with_dual_ascent, (std::uint64_t seed)) {
   Rng rng(seed);
   const PlaneSet planes = random_feasible_planes(rng, 6);
-  const Vec3 goal = random_vector(rng, 2.0);
+  const Vec3 goal = random_point(rng, 2.0);
   const PlaneProjection answer = project_onto_planes(goal, planes, false);
   const Vec3 oracle = dual_ascent(goal, planes);
   // The oracle is never nearer than the answer, and as near up to how far it got.
@@ -80,7 +80,7 @@ RC_GTEST_PROP(ProjectOntoPlanes, agrees_with_dual_ascent, (std::uint64_t seed)) 
 RC_GTEST_PROP(ProjectOntoPlanes, a_goal_within_the_planes_stays_exactly, (std::uint64_t seed)) {
   Rng rng(seed);
   PlaneSet planes;
-  const Vec3 goal = random_vector(rng, 1.0);
+  const Vec3 goal = random_point(rng, 1.0);
   for (int i = 0; i < 10; ++i) {
     const Vec3 normal = random_direction(rng);
     planes.push_back(plane(normal, normal.dot(goal) - rng.uniform(1e-12, 1.0)));
@@ -94,7 +94,7 @@ RC_GTEST_PROP(ProjectOntoPlanes, a_goal_within_the_planes_stays_exactly, (std::u
 RC_GTEST_PROP(ProjectOntoPlanes, duplicates_and_parallels_change_nothing, (std::uint64_t seed)) {
   Rng rng(seed);
   PlaneSet planes = random_feasible_planes(rng, 4);
-  const Vec3 goal = random_vector(rng, 2.0);
+  const Vec3 goal = random_point(rng, 2.0);
   const PlaneProjection expected = project_onto_planes(goal, planes, false);
   const std::size_t count = planes.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -104,7 +104,7 @@ RC_GTEST_PROP(ProjectOntoPlanes, duplicates_and_parallels_change_nothing, (std::
     planes.push_back(lower);
     // The same plane up to rounding.
     ConstraintPlane nearly = planes[i];
-    nearly.normal = (nearly.normal + random_vector(rng, 1e-15)).normalized();
+    nearly.normal = (nearly.normal + random_point(rng, 1e-15)).normalized();
     nearly.offset -= 1e-14;
     planes.push_back(nearly);
   }
@@ -187,7 +187,7 @@ RC_GTEST_PROP(JointSolve, reaches_the_nearest_point_of_a_convex_cell_within_one_
     walls.push_back(std::move(wall));
   }
   const Scene scene = must(Scene::build(std::move(walls), 0.0));
-  const Vec3 goal = random_vector(rng, 3.0);
+  const Vec3 goal = random_point(rng, 3.0);
   ProxyState state;
   step(scene, state, {}, Seconds(1e-3));
   ProbeSample probe;

@@ -15,7 +15,7 @@ TEST(ForceShading, turns_the_god_objects_force_and_keeps_its_size) {
   const Scene shaded = scene_of(coated(source, map, Mapping::uv), ForceShadingLaw{Formulation::literal});
   Rng rng(1);
   for (int i = 0; i < 500; ++i) {
-    Vec3 p = random_vector(rng, 0.015);
+    Vec3 p = random_point(rng, 0.015);
     p.z() = -rng.uniform(1e-5, 2e-3);
     const Vec3 force = poke(shaded, p + Vec3(0.0, 0.0, 5e-3), p).wrench.force;
     ASSERT_NEAR(force.norm(), stiffness * -p.z(), 1e-9);

@@ -153,9 +153,7 @@ TEST(GodObject, ForcesDoNotDependOnHowTheTreeIsCut) {
     Vec3 probe = 0.1 * random_direction(rng);
     Vec3 heading = -probe.normalized();
     for (int i = 0; i < 4000; ++i) {
-      if (rng.below(30) == 0)
-        heading = (random_direction(rng) - 20.0 * (probe.norm() - 0.05) * probe.normalized()).normalized();
-      probe += 2e-4 * heading;
+      test::wander(rng, 0.05, probe, heading);
       const Vec3 force = step(scenes[0], states[0], at(probe), tick).wrench.force;
       touching += force.isZero(0.0) ? 0 : 1;
       ASSERT_EQ(step(scenes[1], states[1], at(probe), tick).wrench.force, force) << "mesh " << m << ", tick " << i;

@@ -49,7 +49,7 @@ TEST(HeightFieldLiteral, pushes_along_the_base_normal_alone) {
   const Scene scene = scene_of(coated(plane_grid(0.04, 0.04, 2, 2), wavy_map(height), Mapping::uv), printed);
   Rng rng(3);
   for (int i = 0; i < 300; ++i) {
-    Vec3 p = random_vector(rng, 0.018);
+    Vec3 p = random_point(rng, 0.018);
     p.z() = rng.uniform(0.0, height);
     const Vec3 force = poke(scene, p, p).wrench.force;
     ASSERT_EQ(force.x(), 0.0);
@@ -108,7 +108,7 @@ TEST(A2_edges, on_the_edge_itself_the_tapered_height_is_exactly_zero) {
 /// Points pressed into the relief of a plane, straight from above.
 void expect_gradient_of_potential(const Scene& scene, std::uint64_t seed) {
   Rng rng(seed);
-  Vec3 p = random_vector(rng, 0.017);
+  Vec3 p = random_point(rng, 0.017);
   p.z() = rng.uniform(-3e-3, -1.2e-3);
   const Vec3 outside(p.x(), p.y(), 5e-3);
   const Vec3 force = poke(scene, outside, p).wrench.force;

@@ -175,7 +175,7 @@ RC_GTEST_PROP(NoForceInTheAir, over_a_relief_on_a_plane, (std::uint64_t seed)) {
     if (faceted(name)) continue;
     ProxyState state;
     for (int i = 0; i < 20; ++i) {
-      Vec3 p = random_vector(rng, 0.018);
+      Vec3 p = random_point(rng, 0.018);
       // The literal laws render nothing below 0; the god-object feels the base at 0.
       const double top = std::max(0.0, map.height_at(Vec2(p.x() / 0.04 + 0.5, p.y() / 0.04 + 0.5)));
       p.z() = top + 1e-8 + rng.uniform(0.0, 3e-3) * rng.uniform();
@@ -191,7 +191,7 @@ RC_GTEST_PROP(NoForceInTheAir, around_a_closed_coated_mesh, (std::uint64_t seed)
   SurfaceCache hint;
   for (const auto& [name, scene] : scenes) {
     for (int i = 0; i < 20; ++i) {
-      const Vec3 p = random_vector(rng, 0.03);
+      const Vec3 p = random_point(rng, 0.03);
       // Over every height of the coat, wherever its foot may be.
       const FieldSample base = surface->base().eval(p, hint);
       if (base.value < 1.01 * surface->coat().amplitude_bound()) continue;
@@ -272,7 +272,7 @@ TEST(CutPlane, feels_the_same_in_2_to_32768_triangles_within_a_tenth_of_a_degree
       Rng rng(21);
       int felt = 0;
       for (int i = 0; i < 300; ++i) {
-        Vec3 p = random_vector(rng, 0.018);
+        Vec3 p = random_point(rng, 0.018);
         p.z() = literal ? rng.uniform(0.0, 5e-4) : rng.uniform(-2e-3, -6e-4);
         const Vec3 outside(p.x(), p.y(), 2e-3);
         const Vec3 expected = poke(whole, outside, p).wrench.force;
@@ -294,7 +294,7 @@ TEST(CutPlane, the_literal_height_field_feels_the_same_without_its_taper) {
   const Scene cut = scene_of(coated(plane_grid(0.04, 0.04, 32768U), map, Mapping::uv), law);
   Rng rng(22);
   for (int i = 0; i < 500; ++i) {
-    Vec3 p = random_vector(rng, 0.018);
+    Vec3 p = random_point(rng, 0.018);
     p.z() = rng.uniform(0.0, 5e-4);
     ASSERT_LT((poke(whole, p, p).wrench.force - poke(cut, p, p).wrench.force).norm(), 1e-4 * stiffness * 5e-4);
   }

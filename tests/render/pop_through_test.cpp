@@ -70,7 +70,7 @@ double random_stride(Rng& rng) {
 /// A point near the surface of the tessellation, at most `off` (m) from it.
 Vec3 random_near(Rng& rng, const TriangleIndex& index, double off) {
   const TriangleMesh& mesh = index.mesh();
-  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_vector(rng, off);
+  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_point(rng, off);
 }
 
 TEST(T5_pop_through, the_tessellations_are_far_finer_than_what_they_judge) {
@@ -92,7 +92,7 @@ Vec3 random_target(Rng& rng, const ReliefSurface& surface, const TriangleIndex& 
   const Vec3 on_edge = (std::array{surface.point(frame, along, 0.0), surface.point(frame, 0.0, along),
                                    surface.point(frame, along, 1.0 - along)}[face % 3])
                            .point;
-  return on_edge + random_vector(rng, 1e-9 * std::pow(1e5, rng.uniform()));
+  return on_edge + random_point(rng, 1e-9 * std::pow(1e5, rng.uniform()));
 }
 
 /// A motion, and whether a dense mesh shows that it gets clearly inside.
@@ -108,7 +108,7 @@ Crossing random_crossing(Rng& rng, const ReliefSurface& surface, const Tessellat
   Crossing made;
   if (aimed) {
     const Vec3 target = random_target(rng, surface, mesh.index);
-    made.from = target + random_vector(rng, 0.9 * stride);
+    made.from = target + random_point(rng, 0.9 * stride);
     made.to = made.from + stride * (target - made.from).normalized();
   } else {
     made.from = random_near(rng, mesh.index, 0.5 * stride);
@@ -344,7 +344,7 @@ TEST(T5_pop_through, valleys_sharper_than_a_right_angle_hold_the_proxy_at_the_ne
     const Scene scene = proxied(surface, Sides::both, 0.0);
     Rng rng(54);
     const Vec3 centre(0.0, 0.3e-3, bottom);
-    const auto next = [&] { return Vec3(centre + random_vector(rng, 1.5e-3)); };
+    const auto next = [&] { return Vec3(centre + random_point(rng, 1.5e-3)); };
     int pressed = 0;
     lead(scene, rng, centre + Vec3(0.0, 0.0, 2e-3), 5000, next, [&](int i, const Vec3& probe, const ForceSample& felt) {
       const Vec3 right = stiffness * (room.nearest(probe) - probe);

@@ -185,7 +185,7 @@ RC_GTEST_PROP(ProxyInvariants, with_friction_the_force_lies_within_coulombs_cone
   touch(scene, state, probe);
   Vec3 heading = Vec3::Zero();
   for (int i = 0; i < 300; ++i) {
-    if (i % 40 == 0) heading = random_vector(rng, 4e-5);
+    if (i % 40 == 0) heading = random_point(rng, 4e-5);
     heading.z() = (-1e-3 - probe.z()) * 0.05;
     probe += heading;
     if (probe.head<2>().cwiseAbs().maxCoeff() > 0.015) heading = -heading;

@@ -503,7 +503,7 @@ TEST(DenseOracleTest, the_relief_is_first_crossed_where_the_facets_say) {
     SurfaceCache hint;
     int certain = 0;
     for (int i = 0; i < 1500; ++i) {
-      Vec3 middle = slide.round ? Vec3(0.02 * random_direction(rng)) : random_vector(rng, 0.012);
+      Vec3 middle = slide.round ? Vec3(0.02 * random_direction(rng)) : random_point(rng, 0.012);
       if (!slide.round) middle.z() *= 0.05;
       const Vec3 way = rng.uniform(0.5e-3, 8e-3) * random_direction(rng);
       const Segment motion{middle - way, middle + way};

@@ -19,7 +19,7 @@ std::vector<Vec3> pressed_path(const TriangleMesh& mesh, Rng& rng, int points) {
   std::vector<Vec3> path;
   Vec3 from = box.centre();
   for (int leg = 0; leg < 12; ++leg) {
-    Vec3 to = box.centre() + 0.35 * box.extent().cwiseProduct(random_vector(rng, 1.0));
+    Vec3 to = box.centre() + 0.35 * box.extent().cwiseProduct(random_point(rng, 1.0));
     // Every third leg ends on a vertex, the next one starts there.
     if (leg % 3 == 0) {
       const Vec3 vertex = mesh.positions()[rng.below(static_cast<std::uint32_t>(mesh.positions().size()))];

@@ -144,7 +144,7 @@ TEST(SceneTest, a_moved_and_turned_instance_feels_as_one_at_the_origin) {
     instance.world_from_object = pose;
     const Scene there = must(Scene::build({instance}, 0.0));
     for (int i = 0; i < 200; ++i) {
-      Vec3 p = random_vector(rng, 0.015);
+      Vec3 p = random_point(rng, 0.015);
       p.z() = rng.uniform(-4e-4, 4e-4);
       const Vec3 outside(p.x(), p.y(), 3e-3);
       const Vec3 expected = pose.rotate(poke(here, outside, p).wrench.force);

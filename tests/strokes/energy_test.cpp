@@ -186,7 +186,7 @@ class World {
         break;
       case 1: what = "law", instance.law = plain_ ? Law(ProxyLaw{}) : any_law(rng_); break;
       case 2:
-        what = "pose", instance.world_from_object.position += test::random_vector(rng_, 1e-3);
+        what = "pose", instance.world_from_object.position += test::random_point(rng_, 1e-3);
         instance.world_from_object.orientation =
             Quat(Eigen::AngleAxisd(rng_.uniform(0.0, 0.05), test::random_direction(rng_))) *
             instance.world_from_object.orientation;
@@ -201,7 +201,7 @@ class World {
         what = "motion", instance.world_from_object = instance.motion.at(instance.world_from_object, Seconds(now));
         instance.motion = {};
         if (rng_.below(2) == 0) {
-          instance.motion.velocity = {test::random_vector(rng_, 0.03), test::random_vector(rng_, 2.0)};
+          instance.motion.velocity = {test::random_point(rng_, 0.03), test::random_point(rng_, 2.0)};
           instance.motion.since = Seconds(now);
           instance.motion.horizon = Seconds(0.5);
         }
@@ -229,7 +229,7 @@ class World {
   }
 
  private:
-  Vec3 around(double size) { return test::random_vector(rng_, size); }
+  Vec3 around(double size) { return test::random_point(rng_, size); }
   Body dressed(const Pose& pose) {
     Body body =
         rng_.below(8) == 0 ? layered(rng_) : makers()[rng_.below(static_cast<std::uint32_t>(makers().size()))](rng_);
@@ -443,11 +443,11 @@ void search(std::uint64_t seed, int ticks, int& softened, int& touched) {
     Loop loop = best;
     if (most == -infinity || rng.below(10) == 0) {
       loop.centre = world.place();
-      for (Vec3& wave : loop.wave) wave = test::random_vector(rng, 3e-3);
+      for (Vec3& wave : loop.wave) wave = test::random_point(rng, 3e-3);
     } else {
       const double size = std::exp(rng.uniform(std::log(1e-5), std::log(3e-3)));
-      loop.centre += test::random_vector(rng, size);
-      loop.wave[rng.below(7)] += test::random_vector(rng, size);
+      loop.centre += test::random_point(rng, size);
+      loop.wave[rng.below(7)] += test::random_point(rng, size);
     }
     const Led after = along(hand, loop);
     const double paid = after.given - hand.given;
@@ -519,10 +519,10 @@ double most_taken(const Instance& instance, double size, std::uint64_t seed) {
       if (attempt % 3 != 1) loop.centre *= 0.95 * size / loop.centre.norm();
     }
     const double reach = fresh ? 0.7e-3 : std::exp(rng.uniform(std::log(1e-5), std::log(1e-3)));
-    if (!fresh) loop.centre += test::random_vector(rng, reach);
+    if (!fresh) loop.centre += test::random_point(rng, reach);
     if (fresh) loop.wave.fill(Vec3::Zero());
     for (Vec3& wave : loop.wave) {
-      if (fresh || rng.below(3) == 0) wave += test::random_vector(rng, reach);
+      if (fresh || rng.below(3) == 0) wave += test::random_point(rng, reach);
     }
     const Vec3 home = loop.centre + 2.0 * size * Vec3(loop.centre.x(), loop.centre.y(), size).normalized();
     Led hand;

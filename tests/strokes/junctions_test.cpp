@@ -250,7 +250,7 @@ TEST(Junctions, AFastPointIsNotKeptByAVertex) {
     double largest = 0.0;
     for (int i = 0; i < 100000; ++i) {
       // Up to 5 m/s over the ball, 1 mm deep.
-      const Vec3 turn = test::random_vector(rng, 1.0);
+      const Vec3 turn = test::random_point(rng, 1.0);
       direction = (direction + rng.uniform(0.0, 5e-3) / radius * turn.normalized()).normalized();
       const Vec3 probe = (radius - 1e-3) * direction;
       const ForceSample sample = step(scene, state, cache, test::probe_at(probe), test::tick);

@@ -29,7 +29,7 @@ std::uint64_t seed_of_the_day() {
 
 Vec3 random_in_ball(Rng& rng) {
   for (;;) {
-    const Vec3 v = test::random_vector(rng, 1.0);
+    const Vec3 v = test::random_point(rng, 1.0);
     if (v.squaredNorm() <= 1.0) return v;
   }
 }

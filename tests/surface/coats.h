@@ -82,10 +82,6 @@ inline std::shared_ptr<const ReliefSurface> coated(MeshSource source, HeightMap 
   return std::make_shared<const ReliefSurface>(MeshSurface(TriangleIndex::build(std::move(mesh))), std::move(coat));
 }
 
-inline Vec3 random_vector(Rng& rng, double size) {
-  return {rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)};
-}
-
 /// Barycentric coordinates inside a triangle, each at least `margin`.
 inline Vec3 random_barycentric(Rng& rng, double margin = 0.0) {
   double u = rng.uniform();

@@ -16,7 +16,7 @@ TEST(MeshSurfaceEval, is_the_exact_signed_distance_of_a_box) {
   Rng rng(1);
   SurfaceCache cache;
   for (int i = 0; i < 3000; ++i) {
-    const Vec3 p = random_vector(rng, 0.02);
+    const Vec3 p = random_point(rng, 0.02);
     const Vec3 over = p.cwiseAbs() - half;
     const double expected = over.cwiseMax(0.0).norm() + std::min(over.maxCoeff(), 0.0);
     const FieldSample sample = box->eval(p, cache);
@@ -32,7 +32,7 @@ TEST(MeshSurfaceEval, gradient_agrees_with_finite_differences) {
   SurfaceCache cache;
   int checked = 0;
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 p = random_vector(rng, 0.03);
+    const Vec3 p = random_point(rng, 0.03);
     const FieldSample here = surface->eval(p, cache);
     const double h = 1e-8;
     Vec3 expected;
@@ -100,9 +100,9 @@ TEST(MeshSurface, answers_the_same_with_and_without_a_cache) {
   const auto surface = bare(random_closed_mesh(2, 3, 0.02, 0.4));
   Rng rng(14);
   SurfaceCache kept;
-  Vec3 p = random_vector(rng, 0.02);
+  Vec3 p = random_point(rng, 0.02);
   for (int i = 0; i < 2000; ++i) {
-    p += random_vector(rng, 2e-4);
+    p += random_point(rng, 2e-4);
     SurfaceCache fresh;
     const FieldSample a = surface->eval(p, kept);
     const FieldSample b = surface->eval(p, fresh);
@@ -140,12 +140,12 @@ TEST(TriangleView, leads_a_point_the_same_with_and_without_a_cache) {
     source.triangles.assign(surface->mesh().triangles().begin(), surface->mesh().triangles().end());
     Led twin(bare(std::move(source)));
     SurfaceCache kept;
-    Vec3 way = random_vector(rng, 1.0).normalized();
+    Vec3 way = random_point(rng, 1.0).normalized();
     int crossed = 0;
     int ready = 0;
     for (int tick = 0; tick < 4000; ++tick) {
-      way = (way + random_vector(rng, 0.05)).normalized();
-      if (tick % 400 == 0) way = random_vector(rng, 1.0).normalized();
+      way = (way + random_point(rng, 0.05)).normalized();
+      if (tick % 400 == 0) way = random_point(rng, 1.0).normalized();
       const Vec3 goal = led.spot.point + 1e-4 * way;
       const std::uint32_t before = led.place.element;
       const FlatAhead ahead = kept.ahead;

@@ -63,7 +63,7 @@ TEST(ReliefRefit, NearestPointsAreThoseOfTheMovedReliefCutFinely) {
     for (int i = 0; i < 60; ++i) {
       const std::uint32_t face = test::random_face(rng, relief.base().mesh());
       const Vec3 p =
-          test::point_on(relief.base().mesh(), face, test::random_barycentric(rng)) + test::random_vector(rng, 0.001);
+          test::point_on(relief.base().mesh(), face, test::random_barycentric(rng)) + test::random_point(rng, 0.001);
       EXPECT_NEAR(relief.view(cache).nearest(p, infinity).distance, dense.index.closest(p, infinity).distance,
                   dense.error);
     }
@@ -85,7 +85,7 @@ TEST(ReliefRefit, WithTextureCoordinatesItIsTheReliefBuiltOnTheMovedMesh) {
     SurfaceCache one;
     SurfaceCache other;
     for (int i = 0; i < 30; ++i) {
-      const Vec3 p = waved(0.05 * test::random_direction(rng)) + test::random_vector(rng, 0.002);
+      const Vec3 p = waved(0.05 * test::random_direction(rng)) + test::random_point(rng, 0.002);
       const Foot foot = moved.view(one).nearest(p, infinity);
       const Foot same = built.view(other).nearest(p, infinity);
       EXPECT_EQ(foot.point, same.point);
@@ -123,7 +123,7 @@ TEST(ReliefRefit, ATurnedReliefIsFeltTurned) {
   SurfaceCache one;
   SurfaceCache other;
   for (int i = 0; i < 100; ++i) {
-    const Vec3 p = 0.05 * test::random_direction(rng) + test::random_vector(rng, 0.001);
+    const Vec3 p = 0.05 * test::random_direction(rng) + test::random_point(rng, 0.001);
     const Foot before = fixture.rest->view(one).nearest(p, infinity);
     const Foot after = moved.view(other).nearest(turned(p), infinity);
     EXPECT_NEAR(after.distance, before.distance, 1e-8);
@@ -243,7 +243,7 @@ TEST(ReliefRefit, HowTheBaseMovesItIsTheReliefBuiltAnew) {
       // Rolled up about y: the ends of the sheet may come to meet.
       const double angle = bend * p.x();
       const double radius = 1.0 / std::max(bend, 1e-3) - p.z();
-      return Vec3(Vec3(radius * std::sin(angle), p.y(), -radius * std::cos(angle)) + test::random_vector(rng, bump));
+      return Vec3(Vec3(radius * std::sin(angle), p.y(), -radius * std::cos(angle)) + test::random_point(rng, bump));
     };
     for (int step = 0; step < 2; ++step) {
       const MeshSurface base = must(deformable.moved(moved_positions(rest->base().mesh(), move)));
@@ -265,8 +265,7 @@ TEST(ReliefRefit, HowTheBaseMovesItIsTheReliefBuiltAnew) {
 TEST(ReliefRefit, BoundsHoldTheReliefOfAMappingByPlaces) {
   Rng rng(9);
   Fixture fixture(Mapping::triplanar);
-  const ReliefSurface moved =
-      fixture.moved_by([&](const Vec3& p) { return waved(p + test::random_vector(rng, 2e-4)); });
+  const ReliefSurface moved = fixture.moved_by([&](const Vec3& p) { return waved(p + test::random_point(rng, 2e-4)); });
   const FacePart whole = FacePart::triangle({0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0});
   for (std::uint32_t face = 0; face < moved.base().mesh().triangles().size(); ++face) {
     const ReliefFrame frame = moved.frame(face);

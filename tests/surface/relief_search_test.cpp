@@ -62,7 +62,7 @@ TEST(ReliefSearch, the_dense_meshes_are_far_finer_than_the_relief) {
 
 /// A point of the dense mesh, and a way off it.
 Vec3 random_near(Rng& rng, const TriangleMesh& mesh, double off) {
-  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_vector(rng, off);
+  return point_on(mesh, random_face(rng, mesh), random_barycentric(rng)) + random_point(rng, off);
 }
 
 TEST(ReliefSearch, the_nearest_point_is_as_near_as_the_dense_meshs_and_on_the_surface) {

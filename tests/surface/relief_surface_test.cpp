@@ -101,7 +101,7 @@ TEST(ReliefEval, gradient_agrees_with_finite_differences) {
   const auto plane = coated(plane_grid(side, side, 4, 4), wavy_map(1e-3), Mapping::uv);
   const auto ball = coated(icosphere(2, 0.02), wavy_map(1e-3), Mapping::triplanar);
   for (int i = 0; i < 500; ++i) {
-    expect_gradient(*plane, random_vector(rng, 0.4 * side), checked);
+    expect_gradient(*plane, random_point(rng, 0.4 * side), checked);
     const TriangleMesh& mesh = ball->base().mesh();
     const std::uint32_t face = random_face(rng, mesh);
     const Vec3 over =
@@ -117,7 +117,7 @@ TEST(ReliefEval, value_is_the_height_over_the_relief_on_a_plane) {
   Rng rng(9);
   SurfaceCache cache;
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 p = random_vector(rng, 0.4 * side);
+    const Vec3 p = random_point(rng, 0.4 * side);
     const double height = map.sample(Vec2(p.x() / side + 0.5, p.y() / side + 0.5)).height;
     const FieldSample sample = relief->eval(p, cache);
     ASSERT_NEAR(sample.value, p.z() - height, 1e-9);
@@ -131,7 +131,7 @@ TEST(ReliefEval, a_coat_of_height_zero_is_the_base) {
   SurfaceCache one;
   SurfaceCache other;
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 p = random_vector(rng, 0.03);
+    const Vec3 p = random_point(rng, 0.03);
     const FieldSample a = relief->eval(p, one);
     const FieldSample b = relief->base().eval(p, other);
     // Shell heights are not distances; inside and outside, and where the surface is, they agree.

@@ -84,7 +84,7 @@ RC_GTEST_PROP(T6_injectivity, several_at_once_are_inverted_as_each_alone, (std::
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const ShellPlace place = random_place(rng, room);
       // One of them so far off that it may be reached from nowhere.
-      const Vec3 p = prism.point(place) + (rng.below(5) == 0 ? random_vector(rng, 10.0 * edge) : Vec3(Vec3::Zero()));
+      const Vec3 p = prism.point(place) + (rng.below(5) == 0 ? random_point(rng, 10.0 * edge) : Vec3(Vec3::Zero()));
       for (std::size_t axis = 0; axis < 3; ++axis) points[axis][lane] = p[static_cast<int>(axis)];
       alone[lane] = {place.u + rng.uniform(-0.01, 0.01), place.v + rng.uniform(-0.01, 0.01),
                      place.height + 0.01 * rng.uniform(room.lower, room.upper)};

@@ -413,7 +413,7 @@ TEST(HeightsAlone, several_at_once_are_each_as_alone) {
           }
           Lanes heights;
           surface->heights_alone(frame, u, v, heights);
-          const Vec3 from = random_vector(rng, 0.02);
+          const Vec3 from = random_point(rng, 0.02);
           Lanes squares;
           surface->squared_distances(frame, u, v, from, squares);
           for (std::size_t lane = 0; lane < lanes; ++lane) {

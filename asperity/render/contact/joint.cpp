@@ -62,17 +62,22 @@ bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintP
   const Vec3 local = touch.to_local(position);
   // How far beyond touching a tangent plane is worth knowing.
   const double reach = radius_ + gap(entry) + (entry.folds ? 2.0 * entry.skin : 0.05 * entry.grain);
+  const Foot foot =
+      on_smooth_view(touch.view, [&](const auto& view) { return view.nearest(local, reach, entry.near); });
+  return foot.found() && plane_off(index, local, foot, entry.near, plane);
+}
+
+/// The plane that keeps a ball, its centre at `local`, off a place of a smooth surface. False where that is behind it.
+bool JointSolve::plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
+                           ConstraintPlane& plane) const noexcept {
+  const Entry& entry = entries_[index];
+  const Touched& touch = *entry.touch;
   // Between folds the nearest point may be an edge: away from it, the ball rolls over it. A foot that is all but
   // reached has no direction of its own, the surface's is taken.
-  Vec3 way = Vec3::Zero();
-  const Foot foot = on_smooth_view(touch.view, [&](const auto& view) {
-    const Foot found = view.nearest(local, reach, entry.near);
-    if (!found.found()) return found;
-    way = found.distance > entry.direct ? Vec3((local - found.point) / found.distance) : found.normal;
-    entry.near = {found.element, way.dot(view.front(found)) < 0.0, found.at};
-    return found;
-  });
-  if (!foot.found() || (entry.near.back && touch.facts->sides == Sides::front)) return false;
+  const Vec3 way = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
+  const Vec3 front = on_smooth_view(touch.view, [&](const auto& view) { return Vec3(view.front(foot)); });
+  place = {foot.element, way.dot(front) < 0.0, foot.at};
+  if (place.back && touch.facts->sides == Sides::front) return false;
   const Vec3 normal = touch.turned(way);
   plane = {normal, normal.dot(touch.to_world(foot.point)) + radius_, gap(entry), static_cast<std::uint32_t>(index),
            foot};
@@ -89,19 +94,14 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
   last_feet_.beyond = beyond;
   last_feet_.planes.clear();
   Entry& entry = entries_[index];
-  const Touched& touch = *entry.touch;
-  const auto& view = *std::get_if<ReliefView>(&touch.view);
-  const Vec3 local = touch.to_local(position);
+  const Vec3 local = entry.touch->to_local(position);
   ContactSet feet;
-  view.feet(local, radius_ + gap(entry) + 2.0 * entry.skin + beyond, feet);
-  for (const Foot& foot : feet) {
-    const Vec3 way = foot.distance > entry.direct ? Vec3((local - foot.point) / foot.distance) : foot.normal;
-    const Place place{foot.element, way.dot(view.front(foot)) < 0.0, foot.at};
-    if (&foot == feet.begin()) entry.near = place;
-    if (place.back && touch.facts->sides == Sides::front) continue;
-    const Vec3 normal = touch.turned(way);
-    last_feet_.planes.push_back({normal, normal.dot(touch.to_world(foot.point)) + radius_, gap(entry),
-                                 static_cast<std::uint32_t>(index), foot});
+  std::get_if<ReliefView>(&entry.touch->view)->feet(local, radius_ + gap(entry) + 2.0 * entry.skin + beyond, feet);
+  for (std::size_t i = 0; i < feet.size(); ++i) {
+    Place place;
+    ConstraintPlane plane;
+    if (plane_off(index, local, feet[i], place, plane)) last_feet_.planes.push_back(plane);
+    if (i == 0) entry.near = place;
   }
   return last_feet_.planes;
 }

@@ -134,6 +134,8 @@ class JointSolve {
     return radius_ > 0.0 && entry.smooth && std::holds_alternative<ReliefView>(entry.touch->view);
   }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
+  [[nodiscard]] bool plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
+                               ConstraintPlane& plane) const noexcept;
   [[nodiscard]] const PlaneSet& feet_planes(std::size_t index, const Vec3& position) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
   /// Those of them that are touched, not only near: what friction can hold by.
