@@ -84,9 +84,11 @@ struct TangentStep {
 
 /// The same in the tangent plane of a surface that a field gives: from a place where the goal lies `pull` (m) along it,
 /// `rate` its length, above 0, and `depth` (m) above it; `second` the field's second derivatives, times `scale` those
-/// over its slope. The pull itself where the distance is not convex. [servo]
+/// over its slope. The pull itself where the distance is not convex. Of a goal that `friction`, a coefficient, has
+/// moved back (`friction_goal`), with how that changes on the way: as the surface bends, the probe is less deep under
+/// it. [servo]
 inline TangentStep tangent_step(const Vec3& normal, const Vec3& pull, double rate, double depth, const Mat3& second,
-                                double scale) noexcept {
+                                double scale, double friction = 0.0) noexcept {
   const Vec3 along = (1.0 / rate) * pull;
   const Vec3 across = normal.cross(along);
   const Vec3 bent = second * along;
@@ -100,7 +102,11 @@ inline TangentStep tangent_step(const Vec3& normal, const Vec3& pull, double rat
   double go_along = rate;
   double go_across = 0.0;
   if (a > 0.05 && determinant > 0.05 * c && c > 0.0) {
-    const double share = rate / determinant;
+    // What the cone holds is friction times how deep the probe is, and that falls by the whole pull, held part
+    // included, times the bend.
+    const double held = depth < 0.0 ? friction * (rate - friction * depth) : 0.0;
+    const double with_friction = determinant - held * (c * bend_along - b * bend_both);
+    const double share = rate / (with_friction > 0.05 * c ? with_friction : determinant);
     go_along = share * c;
     go_across = -share * b;
   }

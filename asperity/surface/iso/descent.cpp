@@ -184,7 +184,7 @@ class Leader {
       pull.step = go * along;
       pull.drop = 0.5 * go * go * bend;
     } else {
-      const TangentStep to = tangent_step(pull.normal, s, pull.rate, depth, jet_.hessian, scale);
+      const TangentStep to = tangent_step(pull.normal, s, pull.rate, depth, jet_.hessian, scale, goal_.friction);
       pull.step = to.step;
       pull.drop = to.drop;
     }
