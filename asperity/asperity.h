@@ -99,6 +99,7 @@
 #include "asperity/surface/parametric/view.h"
 #include "asperity/surface/relief/atlas.h"
 #include "asperity/surface/relief/bake.h"
+#include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/relief/closing.h"
 #include "asperity/surface/relief/frame.h"
 #include "asperity/surface/relief/mesh.h"

@@ -61,7 +61,7 @@ Latency measure_warm(const Experiment& experiment, const std::vector<TraceRecord
   std::vector<double> seconds;
   seconds.reserve(static_cast<std::size_t>(ticks));
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(experiment.scene);
   for (std::size_t i = 0; seconds.size() < static_cast<std::size_t>(ticks); i = (i + 1) % records.size()) {
     if (i == 0) state = ProxyState{};
     seconds.push_back(timed_step(experiment, state, cache, records[i]));
@@ -75,7 +75,7 @@ Latency measure_cold(const Experiment& experiment, const std::vector<TraceRecord
   std::vector<double> seconds;
   CacheSweep sweep;
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(experiment.scene);
   const std::size_t stride = std::max<std::size_t>(1, records.size() / static_cast<std::size_t>(ticks));
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (i % stride == stride - 1) {

@@ -70,7 +70,7 @@ void compare_tick(const TraceRecord& recorded, const ForceSample& rendered, cons
 Result<Comparison> play(const Trace& trace, const Experiment& experiment, const Progress& progress) {
   ASPERITY_TRY(SafetyStage safety, SafetyStage::build(SafetySettings::from_profile(experiment.device)));
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(experiment.scene);
   Comparison comparison;
   for (std::size_t i = 0; i < trace.records.size(); ++i) {
     const TraceRecord& record = trace.records[i];

@@ -30,7 +30,7 @@ Result<RunResult> run_with(const Experiment& experiment, Probe& probe,
   RunResult result;
   result.records.reserve(settings.expected_ticks);
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(experiment.scene);
   Status written = success();
   // Not in real time: what a tick needs of a volume larger than memory is waited for.
   Status fetched = success();

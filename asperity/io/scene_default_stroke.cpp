@@ -26,7 +26,7 @@ Result<double> felt_share(const Scene& scene, const StrokePath& path, const Prob
   const Seconds dt(1.0 / probe.rate);
   const double all = (path.contact_end() - path.contact_begin()) / dt;
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(scene);
   double contact = 0.0;
   while (!hand.finished() && contact < enough * all) {
     const ProbeSample sample = hand.read();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 
 #include "asperity/core/fixed_vector.h"
@@ -12,9 +13,12 @@
 #include "asperity/render/energy/account.h"
 #include "asperity/render/law.h"
 #include "asperity/render/view.h"
+#include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/view.h"
 
 namespace asperity {
+
+class Scene;
 
 // --- what a contact remembers, by what it belongs to ---
 
@@ -108,21 +112,24 @@ static_assert(sizeof(ProxyState) <= 5120);
 /// of one thread, dropped or replaced at any tick.
 class ProxyCache {
  public:
+  ProxyCache() = default;
+  /// With room for what a ball looks at on reliefs, where the scene has a ball and such: without it each of its ticks
+  /// looks at all of that anew. [build]
+  explicit ProxyCache(const Scene& scene);
+
   /// That of an instance, or the one that was not asked for longest. [servo]
   SurfaceCache& of(std::uint32_t instance) noexcept {
     Entry* oldest = &entries_[0];
     for (Entry& entry : entries_) {
       if (entry.instance == instance) {
         entry.used = ++clock_;
-        entry.cache.work = &work_;
-        return entry.cache;
+        return entry.told(work_);
       }
       if (entry.used < oldest->used) oldest = &entry;
     }
     oldest->instance = instance;
     oldest->used = ++clock_;
-    oldest->cache.work = &work_;
-    return oldest->cache;
+    return oldest->told(work_);
   }
   /// What the last tick looked at. [servo]
   [[nodiscard]] WorkMeter& work() noexcept { return work_; }
@@ -132,6 +139,22 @@ class ProxyCache {
     std::uint32_t instance = no_index;
     std::uint64_t used = 0;
     SurfaceCache cache;
+    std::unique_ptr<ReliefBlocks> blocks;
+
+    Entry() = default;
+    Entry(const Entry& other)
+        : instance(other.instance),
+          used(other.used),
+          cache(other.cache),
+          blocks(other.blocks ? std::make_unique<ReliefBlocks>(*other.blocks) : nullptr) {}
+    Entry(Entry&&) noexcept = default;
+    Entry& operator=(Entry&&) noexcept = default;
+    ~Entry() = default;
+    SurfaceCache& told(WorkMeter& work) noexcept {
+      cache.work = &work;
+      cache.blocks = blocks.get();
+      return cache;
+    }
   };
   std::array<Entry, most_contacts> entries_;
   std::uint64_t clock_ = 0;

@@ -108,7 +108,7 @@ std::vector<Gate> gates_along(const Instance& instance, const Scene& scene, cons
 bool detects(const Scene& scene, const Instance& instance, const Gate& gate, double advance, Seconds dt) {
   const View& shown = scene.settings().view;
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(scene);
   ProbeSample probe;
   const auto hand = [&](double depth) -> Vec3 {
     const Vec3 p = instance.world_from_object.apply(gate.point - depth * gate.outward);

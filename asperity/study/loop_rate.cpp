@@ -68,7 +68,7 @@ bool thin(std::vector<Instance>& instances, std::uint32_t stride, LoopRateRow& r
 double median_tick(const Scene& scene, const StrokePath& path, double rate, std::uint64_t ticks) {
   using Clock = std::chrono::steady_clock;
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(scene);
   std::vector<double> times;
   times.reserve(ticks);
   const auto wanted = static_cast<std::uint64_t>(path.duration().count() * rate);

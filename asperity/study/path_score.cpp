@@ -182,7 +182,7 @@ double angle_between(const Vec3& a, const Vec3& b) {
 /// Drives a scene from place to place.
 class Driver {
  public:
-  explicit Driver(const Scene& scene) : scene_(scene) {}
+  explicit Driver(const Scene& scene) : scene_(scene), cache_(scene) {}
 
   /// To `place` in `steps` equal ticks over `duration`. The last tick as a record.
   Result<TraceRecord> go(const Vec3& place, Seconds duration, int steps) {

@@ -14,6 +14,8 @@
 
 namespace asperity {
 
+class ReliefBlocks;
+
 /// The last two cells of a field that were read.
 struct CellCache {
   CellPolynomial cell;
@@ -46,6 +48,7 @@ struct CellCache {
 struct SurfaceCache {
   TrianglePatch patch;
   ReliefCache relief;
+  ReliefBlocks* blocks = nullptr;  ///< of what balls look at, in the caller's hands; none: nothing is kept
   FacePlace<FlatFrame> flat;  ///< the face of a bare mesh that was asked about last
   FlatAhead ahead;            ///< and the one that comes next
   CellCache cells;

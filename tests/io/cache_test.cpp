@@ -36,7 +36,7 @@ int touch_four_ways(const Experiment& e, const std::string& name, std::uint64_t 
   ProxyState dropped_state;
   ProxyState bare_state;
   ProxyState other_state;
-  ProxyCache kept;
+  ProxyCache kept(e.scene);
   ProxyCache dropped;
   int drops = 0;
   int touching = 0;
@@ -54,7 +54,7 @@ int touch_four_ways(const Experiment& e, const std::string& name, std::uint64_t 
     ProbeSample beside = probe;
     beside.pose.position += Vec3(1e-3, -5e-4, 7e-4);
     if (rng.below(7) == 0) {
-      dropped = ProxyCache{};
+      dropped = rng.below(2) == 0 ? ProxyCache{} : ProxyCache(e.scene);
       ++drops;
     }
     const ForceSample expected = step(e.scene, kept_state, kept, probe, Seconds(1e-3));
@@ -89,6 +89,21 @@ TEST_F(Caches, ChangeNoBitOfAnyAnswer) {
   }
   EXPECT_GE(felt, 40);
   EXPECT_GT(touching, 200 * felt);
+}
+
+TEST_F(Caches, ChangeNoBitOfABallsAnswer) {
+  // Where most is kept: on reliefs, one of them moving.
+  int touching = 0;
+  for (const char* name : {"M_a-H_3", "M_d-H_2", "layers", "zoom"}) {
+    for (const double radius : {2e-4, 1e-3}) {
+      Experiment e = good(*builtin_scene_json(name));
+      SceneSettings settings = e.scene.settings();
+      settings.probe_radius = radius;
+      e.scene = Scene::build({e.scene.instances().begin(), e.scene.instances().end()}, settings).value();
+      touching += touch_four_ways(e, std::string(name) + " by a ball", 3, 100);
+    }
+  }
+  EXPECT_GT(touching, 500);
 }
 
 TEST_F(Caches, ChangeNoBitByAnyLaw) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string>
 
+#include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/relief/view.h"
 #include "tests/geometry/random_meshes.h"
 #include "tests/surface/balls.h"
@@ -341,6 +342,46 @@ TEST(ReliefSearch, feet_are_all_places_that_a_ball_may_rest_on) {
     EXPECT_EQ(missed, 0) << one.name;
   }
   EXPECT_GT(several, 100);
+}
+
+TEST(ReliefSearch, feet_are_the_same_to_the_bit_whatever_is_kept_of_earlier_looks) {
+  Rng rng(80);
+  const std::vector<Searched> all = reliefs();
+  ReliefBlocks kept;
+  int felt = 0;
+  for (std::size_t round = 0; round < 3 * all.size(); ++round) {
+    // One after the other by the same room, and each again.
+    const Searched& one = all[round % all.size()];
+    SurfaceCache with;
+    with.blocks = &kept;
+    SurfaceCache without;
+    // A budget is spent alike.
+    WorkMeter work_with;
+    WorkMeter work_without;
+    with.work = &work_with;
+    without.work = &work_without;
+    const CoatMoment moment{round % 2 == 0 ? 0.0 : 0.5, 0.0};
+    Vec3 p = random_near(rng, one.dense.index.mesh(), 1e-3);
+    const double reach = std::pow(10.0, rng.uniform(-3.3, -2.5));
+    for (int i = 0; i < 60; ++i) {
+      if (i % 20 == 19) p = random_near(rng, one.dense.index.mesh(), 1e-3);
+      if (i % 3 != 2) p += 0.1 * reach * random_direction(rng);
+      ContactSet here;
+      ContactSet expected;
+      one.surface->view(with, moment).feet(p, reach, here);
+      one.surface->view(without, moment).feet(p, reach, expected);
+      ASSERT_EQ(here.size(), expected.size()) << one.name << ", case " << i;
+      ASSERT_EQ(work_with.done().sum(), work_without.done().sum()) << one.name << ", case " << i;
+      felt += expected.empty() ? 0 : 1;
+      for (std::size_t k = 0; k < here.size(); ++k) {
+        ASSERT_EQ(here[k].element, expected[k].element) << one.name << ", case " << i;
+        ASSERT_EQ(here[k].at, expected[k].at) << one.name << ", case " << i;
+        ASSERT_EQ(here[k].point, expected[k].point) << one.name << ", case " << i;
+        ASSERT_EQ(here[k].distance, expected[k].distance) << one.name << ", case " << i;
+      }
+    }
+  }
+  EXPECT_GT(felt, 500);
 }
 
 TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {

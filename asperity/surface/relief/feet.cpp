@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "asperity/geometry/closest_point.h"
+#include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/relief/detail/bounds.h"
 #include "asperity/surface/relief/detail/search.h"
 
@@ -13,8 +13,8 @@ namespace asperity {
 
 namespace {
 
-/// Samples of a face's lattice, at most half a texel apart, that lie beside each other: [from, to) in both directions.
-struct Block {
+/// Samples of a face's lattice, at most half a texel apart: [from, to) in both directions.
+struct Range {
   int from_u = 0;
   int to_u = 0;
   int from_v = 0;
@@ -24,8 +24,8 @@ struct Block {
 class ReliefFeetSearch {
  public:
   ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, double reach, const CoatMoment& moment,
-                   ContactSet& out) noexcept
-      : surface_(surface), p_(p), reach_(reach), moment_(moment), out_(out) {}
+                   ReliefBlocks* blocks, ContactSet& out) noexcept
+      : surface_(surface), p_(p), reach_(reach), moment_(moment), blocks_(blocks), out_(out) {}
 
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
 
@@ -39,34 +39,24 @@ class ReliefFeetSearch {
     const Vec3& edge_v = frame.prism.edge_v;
     least_drop_ =
         2.0 * step_ * step_ * std::max({edge_u.squaredNorm(), edge_v.squaredNorm(), (edge_u - edge_v).squaredNorm()});
-    Block stack[3 * deepest_part + 4];
-    int top = 0;
-    stack[top++] = within_reach(frame.prism);
-    while (top > 0) {
-      const Block block = stack[--top];
-      if (block.to_u <= block.from_u || block.to_v <= block.from_v) continue;
-      const bool beyond_third_side = block.from_u + block.from_v > last_;
-      if (beyond_third_side || !may_be_near(frame, block)) continue;
-      if (std::max(block.to_u - block.from_u, block.to_v - block.from_v) <= most_samples) {
-        look_at(frame, block);
-        continue;
-      }
-      const int half_u = block.to_u - block.from_u <= most_samples ? block.to_u : (block.from_u + block.to_u) / 2;
-      const int half_v = block.to_v - block.from_v <= most_samples ? block.to_v : (block.from_v + block.to_v) / 2;
-      stack[top++] = {half_u, block.to_u, half_v, block.to_v};
-      stack[top++] = {block.from_u, half_u, half_v, block.to_v};
-      stack[top++] = {half_u, block.to_u, block.from_v, half_v};
-      stack[top++] = {block.from_u, half_u, block.from_v, half_v};
+    const Range range = within_reach(frame.prism);
+    const int width = std::max(range.to_u - range.from_u, range.to_v - range.from_v);
+    if (range.to_u <= range.from_u || range.to_v <= range.from_v) return;
+    std::uint32_t level = 0;
+    while (BlockSamples::across << level < width) ++level;
+    const int side = BlockSamples::across << level;
+    for (int i = range.from_u / side; i * side < range.to_u; ++i) {
+      for (int j = range.from_v / side; j * side < range.to_v; ++j)
+        search({face, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j), level}, frame, range);
     }
   }
 
  private:
-  static constexpr int most_samples = 8;
-  static constexpr int stride = most_samples + 2;
+  static constexpr int stride = BlockSamples::stride;
   /// The least of the samples around a place that is looked for may be so many of them off it, in thin triangles.
   static constexpr int beside = 2;
 
-  [[nodiscard]] Block within_reach(const ShellPrism& prism) const noexcept {
+  [[nodiscard]] Range within_reach(const ShellPrism& prism) const noexcept {
     Vec2 middle;
     Vec2 reach;
     if (!places_within(prism, p_, reach_, middle, reach)) return {0, last_ + 1, 0, last_ + 1};
@@ -77,88 +67,217 @@ class ReliefFeetSearch {
             to(middle.y() + reach.y())};
   }
 
-  /// Whether the relief around the block's samples may come within reach.
-  [[nodiscard]] bool may_be_near(const ReliefFrame& frame, const Block& block) noexcept {
-    const double room = beside * step_;
-    const Vec2 lower(block.from_u * step_ - room, block.from_v * step_ - room);
-    const Vec2 upper((block.to_u - 1) * step_ + room, (block.to_v - 1) * step_ + room);
-    const FacePart part{
-        {0.5 * (lower + upper), Vec2::Zero(), Vec2::Zero()}, 1, 0.5 * (lower + upper), 0.5 * (upper - lower)};
-    count_.bounds += surface_.bounds_of(frame, part);
-    const HeightForm form = surface_.form(frame, part);
-    const auto half_is_near = [&](const Vec2& a, const Vec2& b, const Vec2& c) {
-      const FacePart half = FacePart::triangle(a, b, c);
-      const Vec2 off = half.middle - part.middle;
-      HeightForm moved = form;
-      moved.height += off.x() * form.u + off.y() * form.v;
-      const ReliefBound bound = bound_over(frame.prism, moved, half);
-      const double square =
-          closest_point_on_triangle(p_, bound.corner[0], bound.corner[1], bound.corner[2]).squared_distance;
-      return square < (reach_ + bound.error) * (reach_ + bound.error);
-    };
-    const Vec2 beside_u(upper.x(), lower.y());
-    const Vec2 beside_v(lower.x(), upper.y());
-    return half_is_near(lower, beside_u, beside_v) || half_is_near(upper, beside_v, beside_u);
-  }
-
-  /// Descends from every sample that is no farther than those around it and may lie beside a place within reach.
-  void look_at(const ReliefFrame& frame, const Block& block) noexcept {
-    // Squared distances, with those of the samples around the block.
-    double squares[stride][stride];
-    sample(frame, block, squares);
-    for (int i = block.from_u; i < block.to_u; ++i) {
-      for (int j = block.from_v; j < block.to_v; ++j) {
-        const int row = i - block.from_u + 1;
-        const int column = j - block.from_v + 1;
-        const double here = squares[row][column];
-        if (!(here < infinity)) continue;
-        bool least = true;
-        for (int side = 0; side < 8 && least; ++side) {
-          constexpr int du[8] = {-1, -1, 0, 1, 1, 1, 0, -1};
-          constexpr int dv[8] = {0, -1, -1, -1, 0, 1, 1, 1};
-          // Of two as near, the first.
-          const double there = squares[row + du[side]][column + dv[side]];
-          least = side < 4 ? here < there : here <= there;
-        }
-        if (!least) continue;
-        const double drop =
-            std::max(least_drop_, 0.5 * (rise(here, squares[row - 1][column], squares[row + 1][column]) +
-                                         rise(here, squares[row][column - 1], squares[row][column + 1])));
-        if (here - drop > reach_ * reach_ || found_beside(frame.face, i * step_, j * step_)) continue;
-        const double u = i * step_;
-        descend_from({frame, u, std::min(j * step_, 1.0 - u)});
+  /// A part of the lattice and those it is made of, as far as they may come within reach.
+  void search(const ReliefBlockName& whole, const ReliefFrame& frame, const Range& range) noexcept {
+    ReliefBlockName stack[3 * deepest_part + 4];
+    int top = 0;
+    stack[top++] = whole;
+    while (top > 0) {
+      const ReliefBlockName name = stack[--top];
+      const int side = BlockSamples::across << name.level;
+      const int u = name.i * side;
+      const int v = name.j * side;
+      const bool beyond_third_side = u + v > last_;
+      if (beyond_third_side || u >= range.to_u || u + side <= range.from_u || v >= range.to_v ||
+          v + side <= range.from_v)
+        continue;
+      bool known = false;
+      ReliefBlocks::Block& block = blocks_ != nullptr ? blocks_->block(name, known) : block_;
+      count_.bounds += bounds_of_block;
+      if (!known) {
+        block.name = name;
+        block.apart = 0.0F;
+        block.disk = disk_around(frame, u, v, side);
+      }
+      if (!within_reach(block)) continue;
+      if (name.level == 0) {
+        look_at(frame, block);
+        continue;
+      }
+      for (int child = 0; child < 4; ++child) {
+        stack[top++] = {name.face, static_cast<std::uint16_t>(2 * name.i + (child & 1)),
+                        static_cast<std::uint16_t>(2 * name.j + (child >> 1)), name.level - 1};
       }
     }
   }
 
-  /// How much farther the neighbours on both sides are at most, of those that there are.
-  static double rise(double here, double before, double after) noexcept {
-    double most = 0.0;
-    if (before < infinity) most = before - here;
-    if (after < infinity) most = std::max(most, after - here);
-    return most;
+  /// Around the relief over a part of the lattice and over what is right beside it.
+  [[nodiscard]] ReliefDisk disk_around(const ReliefFrame& frame, int from_u, int from_v, int side) const noexcept {
+    const double room = beside * step_;
+    const Vec2 lower(from_u * step_ - room, from_v * step_ - room);
+    const Vec2 upper((std::min(from_u + side, last_ + 1) - 1) * step_ + room,
+                     (std::min(from_v + side, last_ + 1) - 1) * step_ + room);
+    const FacePart part{
+        {0.5 * (lower + upper), Vec2::Zero(), Vec2::Zero()}, 1, 0.5 * (lower + upper), 0.5 * (upper - lower)};
+    const HeightForm form = surface_.form(frame, part);
+    const auto half = [&](const Vec2& a, const Vec2& b, const Vec2& c) {
+      const FacePart triangle = FacePart::triangle(a, b, c);
+      const Vec2 off = triangle.middle - part.middle;
+      HeightForm moved = form;
+      moved.height += off.x() * form.u + off.y() * form.v;
+      return bound_over(frame.prism, moved, triangle);
+    };
+    const Vec2 beside_u(upper.x(), lower.y());
+    const Vec2 beside_v(lower.x(), upper.y());
+    const ReliefBound halves[2] = {half(lower, beside_u, beside_v), half(upper, beside_v, beside_u)};
+    const Vec3 middle = 0.5 * (halves[0].corner[0] + halves[1].corner[0]);
+    Vec3 normal =
+        (halves[1].corner[0] - halves[0].corner[0]).cross(halves[0].corner[2] - halves[0].corner[1]).normalized();
+    ReliefDisk disk;
+    for (int a = 0; a < 3; ++a) {
+      disk.middle[a] = middle[a];
+      disk.normal[a] = static_cast<float>(normal[a]);
+    }
+    double radius = 0.0;
+    double thick = 0.0;
+    for (const ReliefBound& bound : halves) {
+      for (const Vec3& corner : bound.corner) {
+        radius = std::max(radius, (corner - middle).norm() + bound.error);
+        thick = std::max(thick, std::abs(normal.dot(corner - middle)) + bound.error);
+      }
+    }
+    // Rounded up, and for the normal's own rounding.
+    disk.radius = static_cast<float>(radius * (1.0 + 1e-6));
+    disk.half = static_cast<float>(thick + 1e-6 * radius);
+    return disk;
   }
 
-  void sample(const ReliefFrame& frame, const Block& block, double (&squares)[stride][stride]) noexcept {
-    for (int i = block.from_u - 1; i <= block.to_u; ++i) {
-      double* row = squares[i - block.from_u + 1];
+  /// Descends from every sample that is no farther than those around it and may lie beside a place within reach.
+  void look_at(const ReliefFrame& frame, ReliefBlocks::Block& block) noexcept {
+    bool known = false;
+    BlockSamples& samples = blocks_ != nullptr ? blocks_->samples(block, known) : samples_;
+    const Vec3 middle(block.disk.middle[0], block.disk.middle[1], block.disk.middle[2]);
+    const int from_u = block.name.i * BlockSamples::across;
+    const int from_v = block.name.j * BlockSamples::across;
+    if (!known) {
+      sample(frame, from_u, from_v, middle, samples);
+      tighten(samples, block);
+    }
+    const Eigen::Vector3f off = (p_ - middle).cast<float>();
+    float squares[BlockSamples::count];
+    float least[BlockSamples::count];
+    squares_from(samples, off, squares);
+    least_around(squares, least);
+    for (int i = 0; i < BlockSamples::across; ++i) {
+      for (int j = 0; j < BlockSamples::across; ++j) {
+        const int at = (i + 1) * stride + j + 1;
+        if (squares[at] > least[at]) continue;
+        const float* const here = &squares[at];
+        if (!first_of_like(here) || !(*here < BlockSamples::nowhere)) continue;
+        const double drop =
+            std::max(least_drop_, 0.5 * (rise(*here, here[-stride], here[stride]) + rise(*here, here[-1], here[1])));
+        const double u = (from_u + i) * step_;
+        const double v = std::min((from_v + j) * step_, 1.0 - u);
+        if (static_cast<double>(*here) - drop > reach_ * reach_ || found_beside(frame.face, u, v)) continue;
+        descend_from({frame, u, v});
+      }
+    }
+  }
+
+  static void squares_from(const BlockSamples& samples, const Eigen::Vector3f& p,
+                           float (&squares)[BlockSamples::count]) noexcept {
+    for (int k = 0; k < BlockSamples::count; ++k) {
+      const float x = samples.x[k] - p.x();
+      const float y = samples.y[k] - p.y();
+      const float z = samples.z[k] - p.z();
+      squares[k] = x * x + y * y + z * z;
+    }
+  }
+
+  /// Of each sample that has them on all sides: the least of those around.
+  static void least_around(const float (&squares)[BlockSamples::count], float (&least)[BlockSamples::count]) noexcept {
+    float of_row[BlockSamples::count];
+    for (int k = 1; k + 1 < BlockSamples::count; ++k)
+      of_row[k] = std::min(squares[k - 1], std::min(squares[k], squares[k + 1]));
+    of_row[0] = squares[0];
+    of_row[BlockSamples::count - 1] = squares[BlockSamples::count - 1];
+    for (int k = stride; k + stride < BlockSamples::count; ++k)
+      least[k] = std::min(of_row[k - stride], std::min(of_row[k], of_row[k + stride]));
+  }
+
+  /// A disk as narrow as what is looked for among a block's samples lets it be: one of them that lies beside a place
+  /// within reach is itself no farther than reach and, about, their distance from one another.
+  static void tighten(const BlockSamples& samples, ReliefBlocks::Block& block) noexcept {
+    const Eigen::Vector3f normal(block.disk.normal[0], block.disk.normal[1], block.disk.normal[2]);
+    float lowest = BlockSamples::nowhere;
+    float highest = -BlockSamples::nowhere;
+    float radius = 0.0F;
+    float apart = 0.0F;
+    const auto at = [&](int k) { return Eigen::Vector3f(samples.x[k], samples.y[k], samples.z[k]); };
+    for (int k = 0; k < stride * stride; ++k) {
+      if (!(samples.x[k] < BlockSamples::far_off)) continue;
+      const Eigen::Vector3f here = at(k);
+      const float above = normal.dot(here);
+      lowest = std::min(lowest, above);
+      highest = std::max(highest, above);
+      radius = std::max(radius, here.squaredNorm());
+      for (const int to : {k + 1, k + stride}) {
+        if (to % stride == 0 || to >= stride * stride || !(samples.x[to] < BlockSamples::far_off)) continue;
+        apart = std::max(apart, (at(to) - here).squaredNorm());
+      }
+    }
+    constexpr float rounding = 1e-5F;
+    radius = std::sqrt(radius);
+    block.around_samples = block.disk;
+    for (int a = 0; a < 3; ++a)
+      block.around_samples.middle[a] += 0.5 * static_cast<double>(lowest + highest) * static_cast<double>(normal[a]);
+    block.around_samples.half = 0.5F * (highest - lowest) + rounding * radius;
+    block.around_samples.radius = (1.0F + rounding) * radius;
+    block.apart = (1.0F + rounding) * std::sqrt(apart);
+  }
+
+  /// Whether something of a part may be what is looked for.
+  [[nodiscard]] bool within_reach(const ReliefBlocks::Block& block) noexcept {
+    if (block.disk.squared_distance(p_) > reach_ * reach_) return false;
+    if (block.name.level == 0) count_.evaluations += evaluations_of_block;
+    if (block.apart <= 0.0F) return true;
+    const auto apart = static_cast<double>(block.apart);
+    const double reach = reach_ + apart + std::max(apart * apart, least_drop_) / reach_;
+    return block.around_samples.squared_distance(p_) <= reach * reach;
+  }
+
+  /// Of two as near, the first.
+  static bool first_of_like(const float* here) noexcept {
+    const float one = *here;
+    return one < here[-stride - 1] && one < here[-stride] && one < here[-1] && one < here[1 - stride] &&
+           one <= here[1] && one <= here[stride + 1] && one <= here[stride] && one <= here[stride - 1];
+  }
+
+  /// How much farther the neighbours on both sides are at most, of those that there are.
+  static double rise(float here, float before, float after) noexcept {
+    float most = 0.0F;
+    if (before < BlockSamples::nowhere) most = before - here;
+    if (after < BlockSamples::nowhere) most = std::max(most, after - here);
+    return static_cast<double>(most);
+  }
+
+  /// The surface at a block's samples and at those around it.
+  void sample(const ReliefFrame& frame, int from_u, int from_v, const Vec3& middle, BlockSamples& out) const noexcept {
+    std::fill_n(out.x, BlockSamples::count, BlockSamples::far_off);
+    std::fill_n(out.y, BlockSamples::count, 0.0F);
+    std::fill_n(out.z, BlockSamples::count, 0.0F);
+    for (int i = from_u - 1; i <= from_u + BlockSamples::across; ++i) {
+      if (i < 0 || i > last_) continue;
       // Of the row what lies in the triangle.
-      const int begin = std::max(0, block.from_v - 1);
-      const int end = i < 0 || i > last_ ? begin : std::min(block.to_v, last_ - i) + 1;
-      std::fill(row, row + (block.to_v - block.from_v + 2), infinity);
+      const int begin = std::max(0, from_v - 1);
+      const int end = std::min(from_v + BlockSamples::across, last_ - i) + 1;
       for (int j = begin; j < end; j += static_cast<int>(lanes)) {
         Lanes u;
         Lanes v;
-        Lanes there;
+        Lanes heights;
         for (std::size_t k = 0; k < lanes; ++k) {
           u[k] = i * step_;
           v[k] = std::min(j + static_cast<int>(k), end - 1) * step_;
         }
-        surface_.squared_distances(frame, u, v, p_, there);
-        for (int k = 0; k < static_cast<int>(lanes) && j + k < end; ++k)
-          row[j + k - block.from_v + 1] = there[static_cast<std::size_t>(k)];
-        // Heights alone, side by side: about as long as one evaluation with its derivatives.
-        ++count_.evaluations;
+        surface_.heights_alone(frame, u, v, heights);
+        for (int k = 0; k < static_cast<int>(lanes) && j + k < end; ++k) {
+          const auto lane = static_cast<std::size_t>(k);
+          const Vec3 there = frame.prism.point({u[lane], v[lane], heights[lane]}) - middle;
+          const int at = (i - from_u + 1) * stride + j + k - from_v + 1;
+          out.x[at] = static_cast<float>(there.x());
+          out.y[at] = static_cast<float>(there.y());
+          out.z[at] = static_cast<float>(there.z());
+        }
       }
     }
   }
@@ -189,11 +308,18 @@ class ReliefFeetSearch {
     if (foot.distance < farthest->distance) *farthest = foot;
   }
 
+  /// What looks take where nothing is known yet: what is counted does not hang on what is.
+  static constexpr std::uint32_t bounds_of_block = 1;
+  static constexpr std::uint32_t evaluations_of_block = stride * stride / lanes;
+
   const ReliefSurface& surface_;
   Vec3 p_;
   double reach_;
   CoatMoment moment_;
+  ReliefBlocks* blocks_;  ///< none: every look is the first
   ContactSet& out_;
+  ReliefBlocks::Block block_;
+  BlockSamples samples_;
   double step_ = 1.0;  ///< of the face's lattice (barycentric)
   int last_ = 1;       ///< sample along an edge
   /// By how much (m^2) a sample may be farther than a place beside it that is nearest, at least: at the face's border
@@ -206,7 +332,17 @@ class ReliefFeetSearch {
 
 void ReliefView::feet(const Vec3& p, double reach, ContactSet& out) const noexcept {
   out.clear();
-  ReliefFeetSearch search(*surface_, p, reach, moment_, out);
+  ReliefBlocks* const blocks = cache_->blocks;
+  if (blocks != nullptr) {
+    blocks->keep_only(surface_->identity(), moment_);
+    // A tick begins where the last one has ended.
+    if (const ReliefBlocks::Answer* known = blocks->answer(p, reach)) {
+      out = known->feet;
+      tell(cache_->work, known->count);
+      return;
+    }
+  }
+  ReliefFeetSearch search(*surface_, p, reach, moment_, blocks, out);
   surface_->base().index().for_each_near(p, reach, surface_->boxes(), [&](std::uint32_t face) {
     search.visit(face);
     return reach;
@@ -215,6 +351,7 @@ void ReliefView::feet(const Vec3& p, double reach, ContactSet& out) const noexce
   std::sort(out.begin(), out.end(), [](const Foot& a, const Foot& b) {
     return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
   });
+  if (blocks != nullptr) blocks->remember({p, reach, out, search.count()});
 }
 
 }  // namespace asperity
