@@ -1,5 +1,7 @@
 #include "asperity/render/step.h"
 
+#include <algorithm>
+
 #include "asperity/render/stages/tick.h"
 
 namespace asperity {
@@ -31,6 +33,15 @@ class VolumeReading {
 };
 
 }  // namespace
+
+ProxyCache::ProxyCache(const Scene& scene) {
+  const auto& instances = scene.instances();
+  const auto is_relief = [](const Instance& instance) { return relief_of(instance) != nullptr; };
+  if (!(scene.probe_radius() > 0.0) || std::none_of(instances.begin(), instances.end(), is_relief)) return;
+  // Any of them may come to be any instance's.
+  for (std::size_t i = 0; i < std::min(instances.size(), entries_.size()); ++i)
+    entries_[i].blocks = std::make_unique<ReliefBlocks>();
+}
 
 ForceSample step(const Scene& scene, ProxyState& state, ProxyCache& cache, const ProbeSample& probe,
                  Seconds dt) noexcept {

@@ -49,8 +49,8 @@ struct SurfaceCache {
   TrianglePatch patch;
   ReliefCache relief;
   ReliefBlocks* blocks = nullptr;  ///< of what balls look at, in the caller's hands; none: nothing is kept
-  FacePlace<FlatFrame> flat;  ///< the face of a bare mesh that was asked about last
-  FlatAhead ahead;            ///< and the one that comes next
+  FacePlace<FlatFrame> flat;       ///< the face of a bare mesh that was asked about last
+  FlatAhead ahead;                 ///< and the one that comes next
   CellCache cells;
   SparseHint sparse;
   WorkMeter* work = nullptr;  ///< what queries tell what they took, in the caller's hands; none: nothing
