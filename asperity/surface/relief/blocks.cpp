@@ -1,23 +1,8 @@
 #include "asperity/surface/relief/blocks.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace asperity {
-
-double ReliefDisk::squared_distance(const Vec3& p) const noexcept {
-  // Of a normal in single precision.
-  constexpr double rounding = 1e-6;
-  const Vec3 off = p - Vec3(middle[0], middle[1], middle[2]);
-  const double square = off.squaredNorm();
-  const double along = off.x() * static_cast<double>(normal[0]) + off.y() * static_cast<double>(normal[1]) +
-                       off.z() * static_cast<double>(normal[2]);
-  const double slack = rounding * std::sqrt(square);
-  const double beyond = std::max(0.0, std::abs(along) - static_cast<double>(half) - slack);
-  const double beside =
-      std::max(0.0, std::sqrt(std::max(0.0, square - along * along)) - static_cast<double>(radius) - slack);
-  return beyond * beyond + beside * beside;
-}
 
 ReliefBlocks::ReliefBlocks()
     : blocks_(std::make_unique<Block[]>(most_blocks)),

@@ -2,7 +2,9 @@
 // What balls have looked at of a relief, kept from tick to tick: it hangs on the face and on the coat's moment, not on
 // where the ball is.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -10,7 +12,7 @@
 #include "asperity/core/math.h"
 #include "asperity/core/work.h"
 #include "asperity/geometry/contact.h"
-#include "asperity/surface/coat.h"
+#include "asperity/surface/relief/frame.h"
 
 namespace asperity {
 
@@ -31,8 +33,22 @@ struct ReliefDisk {
   float radius = 0.0F;  ///< m
   float half = 0.0F;    ///< of its thickness (m)
 
-  /// No place of it is nearer to p (m^2). [servo]
-  [[nodiscard]] double squared_distance(const Vec3& p) const noexcept;
+  /// False where no place of it is within reach (m) of p. [servo]
+  [[nodiscard]] bool may_be_within(double reach, const Vec3& p) const noexcept {
+    // Of a normal in single precision.
+    constexpr double rounding = 1e-6;
+    const Vec3 off = p - Vec3(middle[0], middle[1], middle[2]);
+    const double slack = rounding * off.cwiseAbs().sum();
+    const double along = off.x() * static_cast<double>(normal[0]) + off.y() * static_cast<double>(normal[1]) +
+                         off.z() * static_cast<double>(normal[2]);
+    const double beyond = std::max(0.0, std::abs(along) - static_cast<double>(half) - slack);
+    if (beyond > reach) return false;
+    const double beside = off.squaredNorm() - along * along;
+    const double wide = static_cast<double>(radius) + slack;
+    if (beside <= wide * wide) return true;
+    const double most = wide + std::sqrt(reach * reach - beyond * beyond);
+    return beside <= most * most;
+  }
 };
 
 /// The surface at the samples of a part at level 0, and at those right beside it.
@@ -61,7 +77,7 @@ class ReliefBlocks {
     float apart = 0.0F;         ///< how far they are from those beside them at most (m); 0: they were never known
   };
 
-  /// About 1.6 MB. A copy has room, and forgets what was looked at. [build]
+  /// About 2 MB. A copy has room, and forgets what was looked at. [build]
   ReliefBlocks();
   ReliefBlocks(const ReliefBlocks&) : ReliefBlocks() {}
   ReliefBlocks& operator=(const ReliefBlocks&) = delete;
@@ -70,6 +86,8 @@ class ReliefBlocks {
   void keep_only(std::uint64_t relief, const CoatMoment& moment) noexcept;
   /// The part's own, or the one that makes room for it, `known` false. [servo]
   Block& block(const ReliefBlockName& name, bool& known) noexcept;
+  /// The face's own, or of the relief and the moment that were told last nothing yet. [servo]
+  ReliefFrame& frame(std::uint32_t face) noexcept { return frames_[face % frames_.size()]; }
   /// What was answered of these last, in the caller's order; none: something else was. [servo]
   struct Answer {
     Vec3 p = Vec3::Zero();
@@ -93,6 +111,7 @@ class ReliefBlocks {
   CoatMoment moment_;
   std::uint32_t generation_ = 1;
   std::uint32_t next_ = 0;
+  std::array<ReliefFrame, 32> frames_;
   std::array<Answer, 2> answers_;
   std::size_t next_answer_ = 0;
 };

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
+#include "asperity/surface/detail/four.h"
 #include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/relief/detail/bounds.h"
 #include "asperity/surface/relief/detail/search.h"
@@ -31,7 +33,8 @@ class ReliefFeetSearch {
 
   void visit(std::uint32_t face) noexcept {
     ++count_.frames;
-    const ReliefFrame frame = surface_.frame(face, moment_);
+    ReliefFrame& frame = blocks_ != nullptr ? blocks_->frame(face) : frame_;
+    if (blocks_ == nullptr || !surface_.holds(frame, face, moment_)) frame = surface_.frame(face, moment_);
     const double samples = std::min(texels_across(frame) / leaf_of_texel, std::ldexp(1.0, deepest_part));
     last_ = std::max(1 << (frame.stitched ? least_level_stitched : least_level), static_cast<int>(std::ceil(samples)));
     step_ = 1.0 / last_;
@@ -155,23 +158,50 @@ class ReliefFeetSearch {
     }
     const Eigen::Vector3f off = (p_ - middle).cast<float>();
     float squares[BlockSamples::count];
-    float least[BlockSamples::count];
     squares_from(samples, off, squares);
-    least_around(squares, least);
-    for (int i = 0; i < BlockSamples::across; ++i) {
-      for (int j = 0; j < BlockSamples::across; ++j) {
-        const int at = (i + 1) * stride + j + 1;
-        if (squares[at] > least[at]) continue;
-        const float* const here = &squares[at];
-        if (!first_of_like(here) || !(*here < BlockSamples::nowhere)) continue;
-        const double drop =
-            std::max(least_drop_, 0.5 * (rise(*here, here[-stride], here[stride]) + rise(*here, here[-1], here[1])));
-        const double u = (from_u + i) * step_;
-        const double v = std::min((from_v + j) * step_, 1.0 - u);
-        if (static_cast<double>(*here) - drop > reach_ * reach_ || found_beside(frame.face, u, v)) continue;
-        descend_from({frame, u, v});
+    // Of three samples side by side along v, the least.
+    Four of_row[stride][2];
+    for (int i = 0; i < stride; ++i) {
+      for (int half = 0; half < 2; ++half) {
+        const float* const row = &squares[i * stride + 4 * half];
+        of_row[i][half] = least(least(four_at(row), four_at(row + 1)), four_at(row + 2));
       }
     }
+    for (int i = 0; i < BlockSamples::across; ++i) {
+      for (int half = 0; half < 2; ++half) {
+        const float* const row = &squares[(i + 1) * stride + 4 * half + 1];
+        const Four around = least(least(of_row[i][half], of_row[i + 1][half]), of_row[i + 2][half]);
+        const auto none_less = four_at(row) <= around;
+        for (int j = 0; any(none_less) && j < 4; ++j) {
+          if (none_less[j] != 0) start_from(frame, from_u + i, from_v + 4 * half + j, row + j);
+        }
+      }
+    }
+  }
+
+  /// Descends from a sample, where those around it are no nearer, if it may lead to something new within reach.
+  void start_from(const ReliefFrame& frame, int i, int j, const float* here) noexcept {
+    if (!first_of_like(here) || !(*here < BlockSamples::nowhere)) return;
+    const double drop =
+        std::max(least_drop_, 0.5 * (rise(*here, here[-stride], here[stride]) + rise(*here, here[-1], here[1])));
+    const double u = i * step_;
+    const double v = std::min(j * step_, 1.0 - u);
+    if (static_cast<double>(*here) - drop > reach_ * reach_ || found_beside(frame.face, u, v)) return;
+    descend_from({frame, u, v});
+  }
+
+  using Four = four::Floats;
+  static Four four_at(const float* first) noexcept {
+    Four four;
+    std::memcpy(&four, first, sizeof(four));
+    return four;
+  }
+  static Four least(const Four& a, const Four& b) noexcept { return a < b ? a : b; }
+  template <class Mask>
+  static bool any(const Mask& mask) noexcept {
+    std::uint64_t words[2];
+    std::memcpy(words, &mask, sizeof(words));
+    return (words[0] | words[1]) != 0;
   }
 
   static void squares_from(const BlockSamples& samples, const Eigen::Vector3f& p,
@@ -182,17 +212,6 @@ class ReliefFeetSearch {
       const float z = samples.z[k] - p.z();
       squares[k] = x * x + y * y + z * z;
     }
-  }
-
-  /// Of each sample that has them on all sides: the least of those around.
-  static void least_around(const float (&squares)[BlockSamples::count], float (&least)[BlockSamples::count]) noexcept {
-    float of_row[BlockSamples::count];
-    for (int k = 1; k + 1 < BlockSamples::count; ++k)
-      of_row[k] = std::min(squares[k - 1], std::min(squares[k], squares[k + 1]));
-    of_row[0] = squares[0];
-    of_row[BlockSamples::count - 1] = squares[BlockSamples::count - 1];
-    for (int k = stride; k + stride < BlockSamples::count; ++k)
-      least[k] = std::min(of_row[k - stride], std::min(of_row[k], of_row[k + stride]));
   }
 
   /// A disk as narrow as what is looked for among a block's samples lets it be: one of them that lies beside a place
@@ -228,12 +247,12 @@ class ReliefFeetSearch {
 
   /// Whether something of a part may be what is looked for.
   [[nodiscard]] bool within_reach(const ReliefBlocks::Block& block) noexcept {
-    if (block.disk.squared_distance(p_) > reach_ * reach_) return false;
+    if (!block.disk.may_be_within(reach_, p_)) return false;
     if (block.name.level == 0) count_.evaluations += evaluations_of_block;
     if (block.apart <= 0.0F) return true;
     const auto apart = static_cast<double>(block.apart);
     const double reach = reach_ + apart + std::max(apart * apart, least_drop_) / reach_;
-    return block.around_samples.squared_distance(p_) <= reach * reach;
+    return block.around_samples.may_be_within(reach, p_);
   }
 
   /// Of two as near, the first.
@@ -318,6 +337,7 @@ class ReliefFeetSearch {
   CoatMoment moment_;
   ReliefBlocks* blocks_;  ///< none: every look is the first
   ContactSet& out_;
+  ReliefFrame frame_;
   ReliefBlocks::Block block_;
   BlockSamples samples_;
   double step_ = 1.0;  ///< of the face's lattice (barycentric)
