@@ -86,16 +86,18 @@ class ReliefBlocks {
   void keep_only(std::uint64_t relief, const CoatMoment& moment) noexcept;
   /// The part's own, or the one that makes room for it, `known` false. [servo]
   Block& block(const ReliefBlockName& name, bool& known) noexcept;
-  /// The face's own, or of the relief and the moment that were told last nothing yet. [servo]
+  /// Room for a face's frame: whether it is there already `ReliefSurface::holds` tells. [servo]
   ReliefFrame& frame(std::uint32_t face) noexcept { return frames_[face % frames_.size()]; }
-  /// What was answered of these last, in the caller's order; none: something else was. [servo]
+  /// What `ReliefView::feet` has answered of a place and a reach.
   struct Answer {
     Vec3 p = Vec3::Zero();
     double reach = 0.0;  ///< 0: nothing was
     ContactSet feet;
     WorkCount count;  ///< what it took
   };
+  /// One of the last two, of exactly these; none: they were of others. [servo]
   [[nodiscard]] const Answer* answer(const Vec3& p, double reach) const noexcept;
+  /// In place of the older one. [servo]
   void remember(const Answer& answer) noexcept;
   /// Its samples, or those that make room for them, `known` false. [servo]
   BlockSamples& samples(Block& block, bool& known) noexcept;
