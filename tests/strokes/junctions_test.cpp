@@ -79,8 +79,8 @@ TEST(Junctions, EachPushesByItsOwnStiffnessWhereCornersMeet) {
 int differing(const Scene& one, const Scene& other, std::span<const Vec3> path, double bound, bool all) {
   ProxyState a;
   ProxyState b;
-  ProxyCache cache_a;
-  ProxyCache cache_b;
+  ProxyCache cache_a(one);
+  ProxyCache cache_b(other);
   int count = 0;
   int dropped = 0;
   for (const Vec3& p : path) {
@@ -185,7 +185,7 @@ TEST(Junctions, ABallBesideAWallStaysOnTheRelief) {
     const Scene scene =
         scene_from({instance_of(relief), mesh_at(box_mesh({0.02, 0.06, 0.02}), {-0.01, 0.0, 0.0})}, radius);
     ProxyState state;
-    ProxyCache cache;
+    ProxyCache cache(scene);
     int off_floor = 0;
     double lowest = infinity;
     for (int i = 0; i < 4000; ++i) {

@@ -283,7 +283,7 @@ class Judge {
 /// One stroke of many; answers what was wrong first, or nothing.
 std::string stroke(Rng& rng, const Bodies& bodies, double friction, Tally& tally) {
   ProxyState state;
-  ProxyCache cache;
+  ProxyCache cache(bodies.scene());
   Vec3 probe = bodies.at_clearance(rng, bodies.junction(), 4e-3, 1e-3);
   if (bodies.clearance(probe) < 0.5e-3) return {};
   test::touch(bodies.scene(), state, probe);

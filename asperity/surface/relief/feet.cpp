@@ -124,7 +124,7 @@ class ReliefFeetSearch {
     const Vec2 beside_v(lower.x(), upper.y());
     const ReliefBound halves[2] = {half(lower, beside_u, beside_v), half(upper, beside_v, beside_u)};
     const Vec3 middle = 0.5 * (halves[0].corner[0] + halves[1].corner[0]);
-    Vec3 normal =
+    const Vec3 normal =
         (halves[1].corner[0] - halves[0].corner[0]).cross(halves[0].corner[2] - halves[0].corner[1]).normalized();
     ReliefDisk disk;
     for (int a = 0; a < 3; ++a) {
