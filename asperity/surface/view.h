@@ -11,6 +11,7 @@
 #include "asperity/geometry/triangle_patch.h"
 #include "asperity/surface/mesh/flat_frame.h"
 #include "asperity/surface/relief/frame.h"
+#include "asperity/surface/walk_step.h"
 
 namespace asperity {
 
@@ -81,6 +82,7 @@ struct Goal {
   Sides sides = Sides::both;  ///< that can be in the way
   bool exactly = false;       ///< goes on until rounding alone is left, of reliefs
   int moves = 1024;           ///< places that it may look at
+  double flattest = usually_flattest;  ///< from which share of its metric's curvature on Newton's step is trusted
   /// The same of evaluations, where a place may take several of them.
   std::uint32_t work = no_limit;
   static constexpr std::uint32_t no_limit = ~0U;

@@ -48,7 +48,7 @@ class Walk {
       if (settled()) return DescentEnd::rest;
       forms_ = chart_.forms(goal_);
       formed_ = true;
-      WalkStep step = shortened_ ? ravine_step(forms_) : newton_step(forms_);
+      WalkStep step = shortened_ ? ravine_step(forms_) : newton_step(forms_, asked_.flattest);
       if (step.length <= chart_.rest_length(moves_ == 0)) return DescentEnd::rest;
       if (chart_.blocked(step)) {
         formed_ = false;
@@ -109,7 +109,7 @@ class Walk {
       // While the goal still moves there is a step to make.
       if (!formed_ || moves_ == 0 || (asked_.friction > 0.0 && aims_ <= most_aims)) return false;
       chart_.slope(goal_, forms_);
-      return newton_step(forms_).length <= far_below * chart_.rest_length(false);
+      return newton_step(forms_, asked_.flattest).length <= far_below * chart_.rest_length(false);
     } else {
       return false;
     }

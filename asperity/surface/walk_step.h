@@ -28,8 +28,12 @@ struct WalkForms {
   double h_vv = 0.0;
 };
 
-/// Newton's step where the squared distance is convex, Gauss and Newton's where it is not. [servo]
-inline WalkStep newton_step(const WalkForms& f) noexcept {
+/// Newton's step is a guide where what is left of the squared distance's curvature is this share of its metric's.
+inline constexpr double usually_flattest = 0.02;
+
+/// Newton's step where the squared distance is convex, by more than the share `flattest` of its metric's determinant,
+/// Gauss and Newton's where it is not. [servo]
+inline WalkStep newton_step(const WalkForms& f, double flattest = usually_flattest) noexcept {
   const auto solved = [&](double uu, double uv, double vv, double det) {
     const double u = -(vv * f.g_u - uv * f.g_v) / det;
     const double v = -(uu * f.g_v - uv * f.g_u) / det;
@@ -38,8 +42,7 @@ inline WalkStep newton_step(const WalkForms& f) noexcept {
   const double det = f.uu * f.vv - f.uv * f.uv;
   const double newton_det = f.h_uu * f.h_vv - f.h_uv * f.h_uv;
   // Not convex, or nearly flat: its step would be no guide.
-  constexpr double least_share = 0.02;
-  if (f.h_uu > 0.0 && newton_det > least_share * det) return solved(f.h_uu, f.h_uv, f.h_vv, newton_det);
+  if (f.h_uu > 0.0 && newton_det > flattest * det) return solved(f.h_uu, f.h_uv, f.h_vv, newton_det);
   if (det > 0.0) return solved(f.uu, f.uv, f.vv, det);
   return {};
 }

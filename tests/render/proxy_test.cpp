@@ -357,6 +357,69 @@ TEST(ProxyBall, rests_its_radius_away_from_the_relief) {
   }
 }
 
+/// As rough as ground: waves of all lengths down to six texels.
+HeightMap rough_map(Rng& rng, double height) {
+  struct Wave {
+    double s, t, turn, size;
+  };
+  std::vector<Wave> waves;
+  double sum = 0.0;
+  for (int i = 0; i < 80; ++i) {
+    const double most = std::pow(40.0, rng.uniform(0.0, 1.0));
+    const double turn = rng.uniform(0.0, 2.0 * std::numbers::pi);
+    waves.push_back({std::round(most * std::cos(turn)), std::round(most * std::sin(turn)), rng.uniform(0.0, 6.3),
+                     std::pow(most, -0.8)});
+    sum += waves.back().size;
+  }
+  return map_of(256, [&](double s, double t) {
+    double here = 0.0;
+    for (const Wave& wave : waves)
+      here += wave.size / sum * std::cos(2.0 * std::numbers::pi * (wave.s * s + wave.t * t) + wave.turn);
+    return 2.0 * height * here;
+  });
+}
+
+TEST(ProxyBall, comes_to_rest_among_all_that_it_touches) {
+  Rng rng(71);
+  int held_by_several = 0;
+  for (const double radius : {2e-4, 1e-3}) {
+    for (const double friction : {0.0, 0.4}) {
+      const auto surface = relief_on(mesh_of(plane_grid(0.02, 0.02, 2, 2)), {tiled(rough_map(rng, 1e-3))}, {});
+      const Scene scene = must(Scene::build({instance_of(surface, friction, friction)}, radius));
+      ProxyState state;
+      ProxyCache cache(scene);
+      SurfaceCache looked;
+      const ReliefView view = surface->view(looked);
+      Vec3 place(0.0, 0.0, 2.4e-3);
+      Vec3 heading(0.0, 0.0, -5e-5);
+      for (int i = 0; i < 600; ++i) {
+        if (i % 60 == 59) heading = 6e-5 * random_direction(rng);
+        place += heading;
+        if (place.head<2>().cwiseAbs().maxCoeff() > 6e-3) heading.head<2>() *= -1.0;
+        if ((place.z() < -1.5e-3 && heading.z() < 0.0) || (place.z() > 2.5e-3 && heading.z() > 0.0))
+          heading.z() *= -1.0;
+        const ForceSample felt = step(scene, state, cache, probe_at(place), tick);
+        ASSERT_FALSE(unfinished(felt.flags)) << "radius " << radius << ", tick " << i;
+        held_by_several += felt.contact.places.size() > 1 ? 1 : 0;
+        // It keeps a little off.
+        const double kept = view.nearest(state.proxy, infinity).distance;
+        ASSERT_GT(kept, radius * (1.0 - 1e-6)) << "tick " << i;
+        if (friction > 0.0 || !felt.flags.has(TickFlag::contact)) continue;
+        // Nowhere around is there room nearer to the probe.
+        const double here = (state.proxy - place).norm();
+        for (int k = 0; k < 24; ++k) {
+          const double length = std::pow(10.0, rng.uniform(-6.0, -5.0));
+          const Vec3 there = state.proxy + length * random_direction(rng);
+          if (here - (there - place).norm() < 1e-2 * length) continue;
+          ASSERT_LT(view.nearest(there, infinity).distance, kept + 0.01 * length)
+              << "radius " << radius << ", tick " << i << ", " << length << " m off";
+        }
+      }
+    }
+  }
+  ASSERT_GT(held_by_several, 100);
+}
+
 TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_account) {
   // Amendment 6: at a fixed probe, a change of the scene gives the hand no more than the contact has dissipated.
   const auto surface = relief_on(mesh_of(plane_grid(0.04, 0.04, 4, 4)), {tiled(wavy_map(amplitude))}, {});

@@ -255,6 +255,45 @@ TEST(ReliefSearch, no_motion_is_stopped_by_how_the_tree_is_cut) {
   }
 }
 
+/// A crest that bends up along its way as much as a ball is round, all but for small waves: which of its places is
+/// nearest to the ball's middle the waves decide.
+TEST(ReliefSearch, of_a_ball_that_lies_along_a_narrow_crest_no_place_is_missed) {
+  constexpr double radius = 1e-3;
+  constexpr double tile = 5e-3;
+  Rng rng(83);
+  int several = 0;
+  for (int i = 0; i < 24; ++i) {
+    const double turn = rng.uniform(0.0, std::numbers::pi);
+    const double bend = 1.0 / (radius * (1.0 + std::pow(10.0, rng.uniform(-4.0, -2.0))));
+    const double sharp = 1.0 / rng.uniform(3e-5, 2e-4);
+    const double wave = rng.uniform(1e-4, 3e-4);
+    const double ripple = std::pow(10.0, rng.uniform(-8.0, -6.5));
+    const HeightMap map = map_of(256, [&](double s, double t) {
+      const Vec2 at = tile * Vec2(s - 0.5, t - 0.5);
+      const double along = std::clamp(std::cos(turn) * at.x() + std::sin(turn) * at.y(), -4e-4, 4e-4);
+      const double across = std::clamp(std::cos(turn) * at.y() - std::sin(turn) * at.x(), -2e-4, 2e-4);
+      return 0.5 * bend * along * along + ripple * std::cos(2.0 * std::numbers::pi * along / wave) -
+             0.5 * sharp * across * across;
+    });
+    const auto surface =
+        relief_on(mesh_of(plane_grid(0.02, 0.02, 2, 2)), {tiled(map, tile)},
+                  CoatSettings{Mapping::triplanar, Vec2::Ones(), {FoldMode::keep, Blend::quintic, 0.1, {}}});
+    SurfaceCache cache;
+    const ReliefView view = surface->view(cache);
+    for (int k = 0; k < 12; ++k) {
+      Vec3 p = Vec3(0.5 * tile, 0.5 * tile, radius) + Vec3(rng.uniform(-3e-6, 3e-6), rng.uniform(-3e-6, 3e-6), 0.0);
+      p.z() += radius - view.nearest(p, infinity).distance;
+      const Foot nearest = view.nearest(p, infinity);
+      ContactSet feet;
+      view.feet(p, 1.001 * radius, 1.02 * radius, feet);
+      ASSERT_FALSE(feet.empty());
+      several += feet.size() > 1 ? 1 : 0;
+      ASSERT_LE(feet[0].distance - nearest.distance, 1e-6 * radius) << "case " << i << ", " << k;
+    }
+  }
+  ASSERT_GT(several, 30);
+}
+
 /// Distance of p to a face's relief, the least around a place of it: by trying, in ever smaller steps.
 double least_around(const ReliefSurface& surface, const ReliefFrame& frame, Vec2 at, double step, const Vec3& p) {
   const auto distance = [&](const Vec2& uv) { return (surface.point(frame, uv.x(), uv.y()).point - p).norm(); };
@@ -295,7 +334,7 @@ TEST(ReliefSearch, feet_are_all_places_that_a_ball_may_rest_on) {
       const Foot nearest = surface.view(cache).nearest(p, infinity);
       if (i % 3 == 0) p = nearest.point + rng.uniform(0.999, 1.0) * reach * (p - nearest.point).normalized();
       ContactSet feet;
-      surface.view(cache).feet(p, reach, feet);
+      surface.view(cache).feet(p, reach, reach, feet);
       several += feet.size() > 1 ? 1 : 0;
       // Each of them is one: nothing around it is nearer.
       for (const Foot& foot : feet) {
@@ -368,8 +407,8 @@ TEST(ReliefSearch, feet_are_the_same_to_the_bit_whatever_is_kept_of_earlier_look
       if (i % 3 != 2) p += 0.1 * reach * random_direction(rng);
       ContactSet here;
       ContactSet expected;
-      one.surface->view(with, moment).feet(p, reach, here);
-      one.surface->view(without, moment).feet(p, reach, expected);
+      one.surface->view(with, moment).feet(p, reach, reach, here);
+      one.surface->view(without, moment).feet(p, reach, reach, expected);
       ASSERT_EQ(here.size(), expected.size()) << one.name << ", case " << i;
       ASSERT_EQ(work_with.done().sum(), work_without.done().sum()) << one.name << ", case " << i;
       felt += expected.empty() ? 0 : 1;

@@ -96,7 +96,8 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
   Entry& entry = entries_[index];
   const Vec3 local = entry.touch->to_local(position);
   ContactSet feet;
-  std::get_if<ReliefView>(&entry.touch->view)->feet(local, radius_ + gap(entry) + 2.0 * entry.skin + beyond, feet);
+  const double touching = radius_ + gap(entry) + 2.0 * entry.skin;
+  std::get_if<ReliefView>(&entry.touch->view)->feet(local, touching, touching + beyond, feet);
   for (std::size_t i = 0; i < feet.size(); ++i) {
     Place place;
     ConstraintPlane plane;
@@ -435,7 +436,11 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
       if (!solution.settled() && solution.projection.active.empty()) share_out(goal, solution);
       return solution;
     }
-    settle_among_smooth(goal, solution);
+    if (radius_ > 0.0 && all_tell_feet()) {
+      settle_ball(goal, solution);
+    } else {
+      settle_among_smooth(goal, solution);
+    }
   } else {
     tolerance_ = infinity;
     for (const Entry& entry : entries_) tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);

@@ -147,6 +147,20 @@ class JointSolve {
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
   void settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept;
+  using CutSet = FixedVector<ConstraintPlane, 8>;
+  struct BallMove;
+  [[nodiscard]] bool all_tell_feet() const noexcept;
+  [[nodiscard]] Mat3 bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept;
+  [[nodiscard]] Vec3 bent_step(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy, const Vec3& goal,
+                               double stiffest, double& gain) const noexcept;
+  [[nodiscard]] double free_around(const Vec3& position, double far) noexcept;
+  [[nodiscard]] double swept_share(const Segment& motion, CutSet& met) noexcept;
+  [[nodiscard]] static double overlap(const PlaneSet& planes, const Vec3& position) noexcept;
+  [[nodiscard]] bool restore(Vec3& position, PlaneSet& around, CutSet& met) noexcept;
+  void with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& planes) const noexcept;
+  [[nodiscard]] bool plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move) noexcept;
+  [[nodiscard]] bool make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept;
+  void settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void share_out(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;

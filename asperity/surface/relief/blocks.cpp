@@ -19,9 +19,9 @@ void ReliefBlocks::keep_only(std::uint64_t relief, const CoatMoment& moment) noe
   for (Answer& answer : answers_) answer.reach = 0.0;
 }
 
-const ReliefBlocks::Answer* ReliefBlocks::answer(const Vec3& p, double reach) const noexcept {
+const ReliefBlocks::Answer* ReliefBlocks::answer(const Vec3& p, double touching, double reach) const noexcept {
   for (const Answer& answer : answers_) {
-    if (answer.reach == reach && answer.p == p) return &answer;
+    if (answer.reach == reach && answer.touching == touching && answer.p == p) return &answer;
   }
   return nullptr;
 }

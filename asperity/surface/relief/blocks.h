@@ -91,12 +91,13 @@ class ReliefBlocks {
   /// What `ReliefView::feet` has answered of a place and a reach.
   struct Answer {
     Vec3 p = Vec3::Zero();
+    double touching = 0.0;
     double reach = 0.0;  ///< 0: nothing was
     ContactSet feet;
     WorkCount count;  ///< what it took
   };
   /// One of the last two, of exactly these; none: they were of others. [servo]
-  [[nodiscard]] const Answer* answer(const Vec3& p, double reach) const noexcept;
+  [[nodiscard]] const Answer* answer(const Vec3& p, double touching, double reach) const noexcept;
   /// In place of the older one. [servo]
   void remember(const Answer& answer) noexcept;
   /// Its samples, or those that make room for them, `known` false. [servo]

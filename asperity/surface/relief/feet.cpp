@@ -25,9 +25,9 @@ struct Range {
 
 class ReliefFeetSearch {
  public:
-  ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, double reach, const CoatMoment& moment,
+  ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, double touching, double reach, const CoatMoment& moment,
                    ReliefBlocks* blocks, ContactSet& out) noexcept
-      : surface_(surface), p_(p), reach_(reach), moment_(moment), blocks_(blocks), out_(out) {}
+      : surface_(surface), p_(p), touching_(touching), reach_(reach), moment_(moment), blocks_(blocks), out_(out) {}
 
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
 
@@ -56,6 +56,15 @@ class ReliefFeetSearch {
 
  private:
   static constexpr int stride = BlockSamples::stride;
+  /// Of a descent, before it is seen where it leads, and in all.
+  static constexpr int few_moves = 5;
+  static constexpr int most_moves = 1024;
+  /// A ball may lie on a surface that is bent nearly as it is.
+  static constexpr double flattest = 1e-4;
+  /// Of a step of the lattice: places nearer to each other are told once.
+  static constexpr double same_place = 0.25;
+  /// Squared, in twice the squared length of the longest of the lattice's steps.
+  static constexpr double far_off = 4.5;
   /// The least of the samples around a place that is looked for may be so many of them off it, in thin triangles.
   static constexpr int beside = 2;
 
@@ -167,16 +176,80 @@ class ReliefFeetSearch {
         of_row[i][half] = least(least(four_at(row), four_at(row + 1)), four_at(row + 2));
       }
     }
+    Four nearest = of_row[1][0];
     for (int i = 0; i < BlockSamples::across; ++i) {
       for (int half = 0; half < 2; ++half) {
         const float* const row = &squares[(i + 1) * stride + 4 * half + 1];
         const Four around = least(least(of_row[i][half], of_row[i + 1][half]), of_row[i + 2][half]);
+        nearest = least(nearest, four_at(row));
         const auto none_less = four_at(row) <= around;
         for (int j = 0; any(none_less) && j < 4; ++j) {
           if (none_less[j] != 0) start_from(frame, from_u + i, from_v + 4 * half + j, row + j);
         }
       }
     }
+    const auto beside_touching = static_cast<float>(touching_ * touching_ + 2.0 * least_drop_);
+    if (any(nearest <= beside_touching)) look_closely(frame, from_u, from_v, squares, beside_touching);
+  }
+
+  /// A place beside a sample, in steps of the lattice, and its squared distance.
+  struct Beside {
+    float square;
+    float u = 0.0F;
+    float v = 0.0F;
+  };
+
+  /// Of a ball that touches a narrow crest, samples next to each other are more or less off it: which of them is the
+  /// least tells nothing of where along the crest it is. So crests are led to first, by parabolas across.
+  void look_closely(const ReliefFrame& frame, int from_u, int from_v, const float (&squares)[BlockSamples::count],
+                    float beside_touching) noexcept {
+    float crests[BlockSamples::count];
+    std::fill_n(crests, BlockSamples::count, BlockSamples::nowhere);
+    const auto each = [](const auto& look) {
+      for (int i = 0; i < BlockSamples::across; ++i) {
+        for (int j = 0; j < BlockSamples::across; ++j) look(i, j, (i + 1) * stride + j + 1);
+      }
+    };
+    each([&](int, int, int k) {
+      crests[k] = squares[k] <= beside_touching ? crest_beside(&squares[k]).square : squares[k];
+    });
+    const auto touching = static_cast<float>(touching_ * touching_);
+    each([&](int i, int j, int k) {
+      if (crests[k] > touching || !first_of_like(&crests[k])) return;
+      const Beside crest = crest_beside(&squares[k]);
+      const double u = std::clamp((from_u + i + static_cast<double>(crest.u)) * step_, 0.0, 1.0);
+      const double v = std::clamp((from_v + j + static_cast<double>(crest.v)) * step_, 0.0, 1.0 - u);
+      const bool known = std::any_of(out_.begin(), out_.end(), [&](const Foot& foot) {
+        return foot.element == frame.face && std::hypot(foot.at[1] - u, foot.at[2] - v) <= same_place * step_;
+      });
+      if (!known) descend_from({frame, u, v});
+    });
+  }
+
+  /// The place where a parabola through a sample and those around it is least, across the way along which it changes
+  /// least; the sample itself where that is not beside it.
+  static Beside crest_beside(const float* here) noexcept {
+    const Beside itself{*here};
+    for (const int beside : {-stride - 1, -stride, 1 - stride, -1, 1, stride - 1, stride, stride + 1}) {
+      if (!(here[beside] < BlockSamples::nowhere)) return itself;
+    }
+    const float slope_u = 0.5F * (here[stride] - here[-stride]);
+    const float slope_v = 0.5F * (here[1] - here[-1]);
+    const float uu = here[stride] + here[-stride] - 2.0F * *here;
+    const float vv = here[1] + here[-1] - 2.0F * *here;
+    const float uv = 0.25F * (here[stride + 1] + here[-stride - 1] - here[stride - 1] - here[1 - stride]);
+    const float half = std::hypot(0.5F * (uu - vv), uv);
+    const float most = 0.5F * (uu + vv) + half;
+    if (!(most > 0.0F)) return itself;
+    // Across: along the larger of both curvatures.
+    const float u = uu > vv ? most - vv : uv;
+    const float v = uu > vv ? uv : most - uu;
+    const float length = std::hypot(u, v);
+    if (!(length > 0.0F)) return itself;
+    const float slope = (u * slope_u + v * slope_v) / length;
+    const float off = -slope / most;
+    if (std::abs(off) > 1.0F) return itself;
+    return {*here + 0.5F * slope * off, off * u / length, off * v / length};
   }
 
   /// Descends from a sample, where those around it are no nearer, if it may lead to something new within reach.
@@ -312,8 +385,14 @@ class ReliefFeetSearch {
   void descend_from(const ReliefPlace& place) noexcept {
     ReliefPlace at = place;
     ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
-    const Goal goal{.point = p_, .may_leave = false, .exactly = true};
-    descend(surface_, at, spot, 1.0, goal, count_);
+    const Vec3 start = spot.point;
+    Goal goal{.point = p_, .may_leave = false, .exactly = true, .moves = few_moves, .flattest = flattest};
+    if (descend(surface_, at, spot, 1.0, goal, count_) == DescentEnd::limited) {
+      // What lies further off beyond an edge, samples of the other face lead to.
+      if (at.frame.face != place.frame.face && (spot.point - start).squaredNorm() > far_off * least_drop_) return;
+      goal.moves = most_moves;
+      descend(surface_, at, spot, 1.0, goal, count_);
+    }
     const Foot foot = foot_at(at, spot, p_);
     if (foot.distance > reach_) return;
     const double same = 1e-2 * surface_.grain();
@@ -333,6 +412,7 @@ class ReliefFeetSearch {
 
   const ReliefSurface& surface_;
   Vec3 p_;
+  double touching_;
   double reach_;
   CoatMoment moment_;
   ReliefBlocks* blocks_;  ///< none: every look is the first
@@ -350,19 +430,19 @@ class ReliefFeetSearch {
 
 }  // namespace
 
-void ReliefView::feet(const Vec3& p, double reach, ContactSet& out) const noexcept {
+void ReliefView::feet(const Vec3& p, double touching, double reach, ContactSet& out) const noexcept {
   out.clear();
   ReliefBlocks* const blocks = cache_->blocks;
   if (blocks != nullptr) {
     blocks->keep_only(surface_->identity(), moment_);
     // A tick begins where the last one has ended.
-    if (const ReliefBlocks::Answer* known = blocks->answer(p, reach)) {
+    if (const ReliefBlocks::Answer* known = blocks->answer(p, touching, reach)) {
       out = known->feet;
       tell(cache_->work, known->count);
       return;
     }
   }
-  ReliefFeetSearch search(*surface_, p, reach, moment_, blocks, out);
+  ReliefFeetSearch search(*surface_, p, touching, reach, moment_, blocks, out);
   surface_->base().index().for_each_near(p, reach, surface_->boxes(), [&](std::uint32_t face) {
     search.visit(face);
     return reach;
@@ -371,7 +451,7 @@ void ReliefView::feet(const Vec3& p, double reach, ContactSet& out) const noexce
   std::sort(out.begin(), out.end(), [](const Foot& a, const Foot& b) {
     return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
   });
-  if (blocks != nullptr) blocks->remember({p, reach, out, search.count()});
+  if (blocks != nullptr) blocks->remember({p, touching, reach, out, search.count()});
 }
 
 }  // namespace asperity

@@ -32,8 +32,9 @@ class ReliefView {
   /// Of the displaced surface. `normal` is that of the surface, turned towards p.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
   /// Every place of the surface within `reach` of p (m) that is nearer to it than those around, the nearest first; of
-  /// more than there is room for, the nearest. Normals as nearest's.
-  void feet(const Vec3& p, double reach, ContactSet& out) const noexcept;
+  /// more than there is room for, the nearest. Up to `touching` (m) those on narrow crests as well, where the distance
+  /// hardly changes from one to the next. Normals as nearest's.
+  void feet(const Vec3& p, double touching, double reach, ContactSet& out) const noexcept;
   [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
     ReliefCache& cache = hold(place.element);
     const double u = place.at[1];

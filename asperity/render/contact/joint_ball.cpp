@@ -1,0 +1,281 @@
+// The joint solve of a ball among surfaces that tell all places it may rest on: Newton's method within their planes.
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "asperity/render/contact/joint.h"
+
+namespace asperity {
+
+namespace {
+
+// A stride is no longer than this share of the radius: what it comes to is then still in front of the centre.
+constexpr double longest_stride = 0.25;
+// What it may come to is foreseen for a stride of this share.
+constexpr double farthest_foreseen = 0.02;
+// Curvature that a step reckons with at least, as a share of that of the distance to the goal: where less is left, the
+// place is hardly held, or not at all, and strides are what is long enough.
+constexpr double least_curvature = 0.1;
+constexpr int most_restores = 8;
+// Of their multipliers, which are what overlaps are worth.
+constexpr double overlap_weighs = 1.5;
+// A ball may overlap what it touches by this share of how far it is kept off.
+constexpr double found_of_margin = 5e-4;
+
+/// What holds a step, in the metric in which the distance to the goal is as round as near the place.
+struct Metric {
+  Mat3 inverse_root = Mat3::Identity();
+  Mat3 matrix = Mat3::Identity();
+};
+
+Metric metric_of(const Mat3& hessian, double stiffest) noexcept {
+  Eigen::SelfAdjointEigenSolver<Mat3> solver;
+  solver.computeDirect(hessian);
+  const Vec3 curvature = solver.eigenvalues().cwiseMax(least_curvature).cwiseMin(stiffest);
+  const Mat3& axes = solver.eigenvectors();
+  Metric metric;
+  metric.inverse_root = axes * curvature.cwiseSqrt().cwiseInverse().asDiagonal() * axes.transpose();
+  metric.matrix = axes * curvature.asDiagonal() * axes.transpose();
+  return metric;
+}
+
+/// How the direction from a surface changes with the place at a distance from it, by how it changes on the surface.
+Mat3 bend_at_distance(const Mat3& bend, double distance) noexcept {
+  // Where it bends towards the place as much as a ball around that, it is as good as a corner.
+  constexpr double least = 1e-6;
+  Eigen::SelfAdjointEigenSolver<Mat3> solver;
+  solver.computeDirect(bend);
+  const Vec3 curvature = solver.eigenvalues();
+  const Vec3 grown = curvature.array() / (1.0 + distance * curvature.array()).max(least);
+  const Mat3& axes = solver.eigenvectors();
+  return axes * grown.asDiagonal() * axes.transpose();
+}
+
+}  // namespace
+
+bool JointSolve::all_tell_feet() const noexcept {
+  return std::all_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return !entry.smooth || tells_all_feet(entry); });
+}
+
+/// The second derivative of the distance from what a plane is of, where the ball's centre is.
+Mat3 JointSolve::bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept {
+  constexpr double as_surface = 1.0 - 1e-6;
+  const Entry& entry = entries_[plane.owner];
+  const Touched& touch = *entry.touch;
+  const double distance = std::max(distance_to_foot(plane, position), 1e-9 * radius_);
+  const Mat3 round = (Mat3::Identity() - plane.normal * plane.normal.transpose()) / distance;
+  const auto around = [&](const Vec3& edge) { return Mat3(round - edge * edge.transpose() / distance); };
+  if (!entry.smooth) return rolls(plane) ? around(edge_of(plane)) : Mat3(Mat3::Zero());
+  const ReliefView& view = *std::get_if<ReliefView>(&touch.view);
+  const Place place{plane.contact.element, false, plane.contact.at};
+  const ReliefPoint& spot = view.at(place);
+  const double aligned = plane.normal.dot(touch.turned(spot.front));
+  if (std::abs(aligned) < as_surface) {
+    // On a fold, which goes across both; at its corners it is round.
+    const bool corner = plane.contact.at.maxCoeff() >= 1.0;
+    return corner ? round : around(plane.normal.cross(touch.turned(spot.front)).normalized());
+  }
+  const Mat3 local = bend_at_distance(std::copysign(1.0, aligned) * view.bend(place, spot), distance);
+  if (touch.at_origin) return local;
+  const Mat3 turn = touch.pose->orientation.toRotationMatrix();
+  return turn * local * turn.transpose();
+}
+
+/// From `proxy` to the place that is nearest to the goal within planes, by how they and what they are of bend.
+Vec3 JointSolve::bent_step(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy, const Vec3& goal,
+                           double stiffest, double& gain) const noexcept {
+  const Vec3 pull = goal - proxy;
+  const Vec3 straight = flat.point - proxy;
+  gain = pull.dot(straight) - 0.5 * straight.squaredNorm();
+  if (flat.active.empty() || flat.active.size() == 3) return straight;
+  Mat3 hessian = Mat3::Identity();
+  for (const PlaneProjection::Active& active : flat.active)
+    hessian -= active.multiplier * bend_of(planes[active.plane], proxy);
+  const Metric metric = metric_of(hessian, stiffest);
+  PlaneSet bent;
+  for (const ConstraintPlane& plane : planes) {
+    ConstraintPlane there;
+    there.normal = metric.inverse_root * plane.normal;
+    const double length = there.normal.norm();
+    there.normal /= length;
+    there.offset = (plane.offset + plane.skin - plane.normal.dot(proxy)) / length;
+    bent.push_back(there);
+  }
+  const Vec3 step = metric.inverse_root * project_onto_planes(metric.inverse_root * pull, bent, true).point;
+  gain = pull.dot(step) - 0.5 * step.dot(metric.matrix * step);
+  return step;
+}
+
+/// How far nothing is in the way of a ball that touches nothing, whichever way it goes, up to `far`.
+double JointSolve::free_around(const Vec3& position, double far) noexcept {
+  double free = far;
+  for (Entry& entry : entries_) {
+    if (!entry.smooth) continue;
+    const double around = radius_ + gap(entry);
+    const Vec3 local = entry.touch->to_local(position);
+    const Foot foot = on_smooth_view(entry.touch->view,
+                                     [&](const auto& view) { return view.nearest(local, free + around, entry.near); });
+    if (foot.found()) free = std::max(0.0, std::min(free, foot.distance - around));
+  }
+  return free;
+}
+
+/// Along a step as far as triangles let it, and what stops it there.
+double JointSolve::swept_share(const Segment& motion, CutSet& met) noexcept {
+  double share = 1.0;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Entry& entry = entries_[i];
+    if (entry.smooth) continue;
+    const Touched& touch = *entry.touch;
+    const Segment local = touch.to_local(motion);
+    const SweptHit hit =
+        entry.patch != nullptr
+            ? entry.patch->segment(local, radius_ + margin(), touch.facts->sides)
+            : std::get_if<TriangleView>(&touch.view)->sweep(local, radius_ + margin(), touch.facts->sides);
+    if (!hit.hit || hit.t >= 1.0) continue;
+    share = std::min(share, hit.t);
+    if (hit.contact.found()) met.push_back(plane_of(i, hit.contact));
+  }
+  return share;
+}
+
+/// By how much (m) planes are overlapped at most.
+double JointSolve::overlap(const PlaneSet& planes, const Vec3& position) noexcept {
+  double most = 0.0;
+  for (const ConstraintPlane& plane : planes)
+    most = std::max(most, plane.offset + plane.skin - plane.normal.dot(position));
+  return most;
+}
+
+/// Out of all that a ball overlaps; `around`: planes where it then is. What it has met goes into `met`.
+bool JointSolve::restore(Vec3& position, PlaneSet& around, CutSet& met) noexcept {
+  const double room = found_of_margin * margin();
+  for (int round = 0; round < most_restores; ++round) {
+    around.clear();
+    touched(position, around);
+    if (overlap(around, position) <= room) return true;
+    for (const ConstraintPlane& plane : around) {
+      if (round == 0 && plane.offset + plane.skin - plane.normal.dot(position) > room) met.push_back(plane);
+    }
+    const Vec3 out = project_onto_planes(position, around, true).point;
+    if ((out - position).norm() > radius_) return false;
+    position += swept_share({position, out}, met) * (out - position);
+  }
+  return false;
+}
+
+/// Planes around a place, and those of what a ball would come to that went on from there.
+void JointSolve::with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& planes) const noexcept {
+  constexpr double same = 0.9999;
+  for (ConstraintPlane cut : cuts) {
+    const Vec3 foot = entries_[cut.owner].touch->to_world(cut.contact.point);
+    const Vec3 off = position - foot;
+    const double distance = off.norm();
+    if (distance > 2.0 * (radius_ + margin()) || distance == 0.0) continue;
+    cut.normal = off / distance;
+    cut.offset = cut.normal.dot(foot) + radius_;
+    const bool known = std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& plane) {
+      return plane.owner == cut.owner && plane.normal.dot(cut.normal) > same && plane.offset >= cut.offset;
+    });
+    if (!known) planes.push_back(cut);
+  }
+}
+
+/// A move of a ball from where it is, and what the ones before have taught.
+struct JointSolve::BallMove {
+  Vec3 goal = Vec3::Zero();
+  CutSet cuts = {};
+  double room = 0.0;      ///< a stride is no longer (m)
+  double stiffest = 1e2;  ///< curvature that a step reckons with at most
+  PlaneSet around = {};
+  PlaneProjection flat = {};  ///< of the goal onto them
+  double rest = 0.0;          ///< how far that is (m)
+  Vec3 step = Vec3::Zero();
+  double length = 0.0;
+  double gain = 0.0;    ///< of half the squared distance that it should come to, overlaps left behind counted in (m^2)
+  double weight = 0.0;  ///< what an overlap of 1 m counts
+  double overlapped = 0.0;
+};
+
+/// Looks where it is to go from `proxy`. False where that is no farther than what is worth a move.
+bool JointSolve::plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move) noexcept {
+  move.around = planes;
+  const auto look = [&] {
+    move.flat = project_onto_planes(move.goal, move.around, true);
+    move.rest = (move.flat.point - proxy).norm();
+    return move.rest > tolerance_;
+  };
+  if (!look()) return false;
+  if (!move.cuts.empty()) {
+    with_cuts(move.cuts, proxy, move.around);
+    if (!look()) return false;
+  }
+  move.step = bent_step(move.around, move.flat, proxy, move.goal, move.stiffest, move.gain);
+  move.length = move.step.norm();
+  double longest = move.room;
+  if (move.around.empty() && move.length > longest) longest = std::max(longest, free_around(proxy, move.length));
+  if (move.length > longest) {
+    move.step *= longest / move.length;
+    move.gain *= longest / move.length;
+    move.length = longest;
+  }
+  move.weight = 0.0;
+  for (const PlaneProjection::Active& active : move.flat.active) move.weight += overlap_weighs * active.multiplier;
+  move.overlapped = move.weight * overlap(move.around, proxy);
+  move.gain += move.overlapped;
+  return true;
+}
+
+/// Makes the move where it comes to enough; learns from it in any case.
+bool JointSolve::make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept {
+  constexpr double least_share = 0.05;
+  constexpr double more_than_told = 1.5;
+  stride_ = std::min(move.length, farthest_foreseen * radius_);
+  CutSet met;
+  PlaneSet there;
+  Vec3 next = proxy + swept_share({proxy, proxy + move.step}, met) * move.step;
+  if (restore(next, there, met)) {
+    const double nearer = 0.5 * ((proxy - move.goal).squaredNorm() - (next - move.goal).squaredNorm());
+    const double gained = nearer + move.overlapped - move.weight * overlap(there, next);
+    bool worth = gained > least_share * move.gain;
+    // Near the end what is gained is lost among what overlaps are known to.
+    if (!worth && gained > -move.weight * found_of_margin * margin())
+      worth = (project_onto_planes(move.goal, there, true).point - next).norm() < 0.5 * move.rest;
+    if (worth) {
+      if (gained > more_than_told * move.gain) move.stiffest = std::max(10.0, 0.1 * move.stiffest);
+      if (move.length >= 0.9 * move.room) move.room = std::min(2.0 * move.room, longest_stride * radius_);
+      proxy = next;
+      planes = there;
+      return true;
+    }
+  }
+  for (const ConstraintPlane& plane : met) {
+    if (move.cuts.size() == move.cuts.capacity()) move.cuts.swap_remove(0);
+    move.cuts.push_back(plane);
+  }
+  move.room = 0.3 * move.length;
+  move.stiffest *= 10.0;
+  return false;
+}
+
+void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept {
+  constexpr int most_moves = 160;
+  constexpr double least_room = 0.01;  // of what is worth a move
+  BallMove move{.goal = goal, .room = longest_stride * radius_};
+  solution.planes.clear();
+  touched(solution.proxy, solution.planes);
+  for (int i = 0; i < most_moves && !work_.spent(); ++i) {
+    const bool on = plan(solution.proxy, solution.planes, move);
+    if (on && (make(move, solution.proxy, solution.planes) || move.room > least_room * tolerance_)) continue;
+    // At rest, or no move comes nearer: by all that is known to hold it.
+    solution.planes = move.around;
+    if (!on && solution.planes.empty()) solution.proxy = move.flat.point;
+    solution.converged = true;
+    return;
+  }
+}
+
+}  // namespace asperity
