@@ -122,6 +122,8 @@ void print_summary(const Experiment& experiment, const RunResult& run, const Run
   std::cout << fmt::format("ticks    {} at {:g} Hz, {} in contact\n", run.summary.ticks, experiment.rate,
                            m.ticks.contact);
   std::cout << fmt::format("force    mean {:.3g} N, max {:.3g} N\n", m.force.mean, m.force.max);
+  if (experiment.scene.settings().tool_length > 0.0)
+    std::cout << fmt::format("torque   mean {:.3g} mN m, max {:.3g} mN m\n", 1e3 * m.torque.mean, 1e3 * m.torque.max);
   std::cout << fmt::format("height   {}\n", height_line(m.height));
   std::cout << fmt::format("update   p50 {}, p99.9 {}\n", format_seconds(m.update.p50), format_seconds(m.update.p999));
   std::cout << fmt::format("flags    {}\n", flag_list(m.ticks));

@@ -38,7 +38,7 @@ struct Twist {
   Vec3 angular = Vec3::Zero();
 };
 
-/// Force (N) and torque (N·m) on the probe, world frame, torque about the probe's position.
+/// Force (N) and torque (N·m) on the probe, world frame, torque about where the probe is held.
 struct Wrench {
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();

@@ -106,8 +106,8 @@ struct ForceParts {
 
 /// What the hand should feel. World frame, SI.
 struct ForceSample {
-  /// `wrench.torque` is zero until tools have a shape: a point or a ball is not turned. Recorded in traces, rendered by
-  /// no device yet.
+  /// `wrench.torque` is about where the hand holds the tool (SceneSettings::tool_length), zero where the scene says
+  /// nothing of that. Recorded in traces, rendered by no device yet.
   Wrench wrench;
   ForceParts parts;           ///< of the wrench's force; not recorded in traces
   Vec3 proxy = Vec3::Zero();  ///< the probe's constrained twin (m); equals the probe's position in free space

@@ -68,6 +68,7 @@ struct StrokeSettings {
   double speed = 0.02;  ///< along the surface (m/s), above 0
   PressMode press = PressMode::depth;
   double depth = 0.001;            ///< PressMode::depth (m); negative stays above the surface
+  double tip_radius = 0.0;         ///< of the ball that is led (m), 0 or more: its lowest point is at depth or height
   double normal_force = 1.0;       ///< PressMode::force (N), above 0
   double approach_height = 0.005;  ///< above the surface, where the stroke starts and ends (m), 0 or more
   double approach_speed = 0.02;    ///< towards and away from the surface (m/s), above 0

@@ -212,6 +212,8 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   SceneSettings settings;
   settings.probe_radius = probe.value.radius;
   settings.tip_radius = probe.value.tip;
+  settings.tool_length = probe.value.tool_length;
+  settings.tool_axis = probe.value.tool_axis;
   ASPERITY_TRY(settings.view, read_view(root, bounds));
   ASPERITY_CHECK(read_change(root, settings));
   settings.budget = static_cast<std::uint32_t>(
@@ -219,6 +221,9 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   note_detail(instances, settings, context);
   ASPERITY_TRY(ScenePart<StrokeSettings> stroke,
                read_stroke(root.raw("stroke"), "stroke", in_workspace(settings.view, bounds), context));
+  const auto takes_ball = [](const Instance& instance) { return instance.law.constrains(); };
+  // What touches with a point touches with the tip's middle.
+  if (std::any_of(instances.begin(), instances.end(), takes_ball)) stroke.value.tip_radius = settings.probe_radius;
   const SceneJson* stroke_json = root.raw("stroke");
   const auto says = [&](const char* key) { return stroke_json != nullptr && stroke_json->contains(key); };
   if (bodiless && !says("depth") && !says("normal_force") && !says("path")) {

@@ -60,6 +60,7 @@ Result<ScenePart<ProbeSettings>> read_probe(const SceneJson* json, const std::st
   probe.ideal.stiffness_estimate = stiffness;
   probe.dynamic = reader.get<ProbeKind>("kind") == ProbeKind::dynamic;
   reader.read_all(probe);
+  probe.tool_axis = reader.get<Vec3>("tool_axis").normalized();
   probe.ideal = read_part(reader, "ideal", "ideal probe", probe.ideal);
   probe.simulated = read_part(reader, "dynamic", "dynamic probe", probe.simulated);
   ASPERITY_CHECK(reader.status());

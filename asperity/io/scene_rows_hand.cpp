@@ -48,6 +48,11 @@ void probe(SceneObject& row) {
       "Radius of the tip whose path a point follows on coats with levels of detail by dilation; 0: a point. Laws touch "
       "with a point all the same.",
       &ProbeSettings::tip);
+  row("tool_length", length(not_negative),
+      "From the tip to where the hand holds the tool: torque is answered about there; 0: none is.",
+      &ProbeSettings::tool_length);
+  row("tool_axis", Type::direction(), "The way from the tip to there, in the probe's own frame.",
+      with_default(Vec3(0.0, 1.0, 0.0)), by_contents("three zeros, which are no direction"));
   row("rate", frequency(rates), "Force updates a second.", &ProbeSettings::rate, or_else("the device's rate"));
   row("ideal", Type::object("ideal probe"), "Settings read when kind is ideal.");
   row("dynamic", Type::object("dynamic probe"), "Settings read when kind is dynamic.");
@@ -157,8 +162,8 @@ void stroke(SceneObject& row) {
     static_cast<S*>(of)->press = PressMode::force;
     static_cast<S*>(of)->normal_force = from_option<double>(value);
   };
-  row("depth", length(), "How far below the base surface the probe is led; negative stays above.", &S::depth,
-      only_if(drawn, by), only_if(Test::without("normal_force"), "beside normal_force"),
+  row("depth", length(), "How far below the base surface the tip's lowest point is led; negative stays above.",
+      &S::depth, only_if(drawn, by), only_if(Test::without("normal_force"), "beside normal_force"),
       or_else("1 mm, at most 2 % of the object's diagonal"));
   row("approach_height", length(not_negative), "Where the stroke starts and ends over the surface.",
       &S::approach_height, only_if(drawn, by), or_else("5 % of the object's diagonal"));

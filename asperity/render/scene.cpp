@@ -209,6 +209,10 @@ Status check(const SceneSettings& settings) {
   if (!length(settings.probe_radius))
     return bad("probe.radius", settings.probe_radius, "a length of 0 or more (m, mm)");
   if (!length(settings.tip_radius)) return bad("probe.tip", settings.tip_radius, "a length of 0 or more (m, mm)");
+  if (!length(settings.tool_length))
+    return bad("probe.tool_length", settings.tool_length, "a length of 0 or more (m, mm)");
+  if (!(std::abs(settings.tool_axis.squaredNorm() - 1.0) <= 1e-6))
+    return bad("probe.tool_axis", settings.tool_axis.norm(), "a direction of length 1");
   if (auto valid = validate(settings.view); !valid) return std::move(valid).error().at("view");
   if (!length(settings.handover.count()))
     return bad("handover", settings.handover.count(), "a time of 0 or more (s, ms)");

@@ -18,6 +18,10 @@ struct SceneSettings {
   double probe_radius = 0.0;  ///< m, workspace: of the probe's tip; 0 is a point
   /// Radius (m, workspace) of the tip whose path a point follows on coats with levels of detail by dilation; 0: none.
   double tip_radius = 0.0;
+  /// From the tip to where the hand holds the tool (m, workspace), `tool_axis` the way there in the probe's own frame,
+  /// unit: about there torque is answered. 0: none is.
+  double tool_length = 0.0;
+  Vec3 tool_axis = Vec3::UnitY();
   View view = {};
   /// Over how long a change of the scene is spread, as far as the account pays for it (s); 0: felt at once.
   Seconds handover{0.01};

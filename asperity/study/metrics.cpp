@@ -64,6 +64,20 @@ ForceMetrics measure_force(std::span<const TraceRecord> records, const RunSeries
   return m;
 }
 
+TorqueMetrics measure_torque(std::span<const TraceRecord> records) {
+  TorqueMetrics m;
+  double count = 0.0;
+  for (const TraceRecord& record : records) {
+    if (!in_contact(record)) continue;
+    const double torque = record.rendered.wrench.torque.norm();
+    count += 1.0;
+    m.mean += torque;
+    m.max = std::max(m.max, torque);
+  }
+  if (count > 0.0) m.mean /= count;
+  return m;
+}
+
 /// Of all ticks, or of those near a sharp edge or away from all of them.
 enum class Where { everywhere, near_edges, elsewhere };
 
@@ -235,6 +249,7 @@ RunMetrics measure_run(std::span<const TraceRecord> records, const RunSeries& se
   RunMetrics m;
   m.ticks = measure_ticks(records, series);
   m.force = measure_force(records, series);
+  m.torque = measure_torque(records);
   m.direction = measure_direction(series, Where::everywhere);
   m.direction_near = measure_direction(series, Where::near_edges);
   m.direction_far = measure_direction(series, Where::elsewhere);
@@ -299,6 +314,8 @@ std::vector<MetricRow> metric_rows(const RunMetrics& m) {
           {"/force/largest_jump", "jump_n", m.force.largest_jump},
           {"/force/jump_tick", "jump_tick", m.force.jump_tick},
           {"/force/jump_distance", "jump_mm", m.force.jump_distance, milli},
+          {"/torque/mean", "torque_mean_mnm", m.torque.mean, milli},
+          {"/torque/max", "torque_max_mnm", m.torque.max, milli},
           {"/direction/samples", "direction_samples", m.direction.samples},
           {"/direction/mean", "direction_mean_deg", m.direction.mean, degrees},
           {"/direction/p99", "direction_p99_deg", m.direction.p99, degrees},

@@ -25,6 +25,12 @@ struct ForceMetrics {
   double jump_distance = 0.0;   ///< travelled distance there (m); not-a-number off the surface
 };
 
+/// Torque about where the hand holds the tool, over the ticks in contact (N m); 0 where the scene has no tool.
+struct TorqueMetrics {
+  double mean = 0.0;
+  double max = 0.0;
+};
+
 /// Angle between rendered force and reference normal (rad), over the ticks of the contact phase.
 struct DirectionMetrics {
   std::size_t samples = 0;
@@ -100,6 +106,7 @@ struct TickMetrics {
 struct RunMetrics {
   TickMetrics ticks;
   ForceMetrics force;
+  TorqueMetrics torque;
   DirectionMetrics direction;
   DirectionMetrics direction_near;  ///< near sharp edges of the geometry
   DirectionMetrics direction_far;   ///< elsewhere

@@ -59,6 +59,9 @@ std::string summarise(const RunReport& report) {
   if (m.ticks.contact == 0) return text + "Nothing was touched: no force was felt.";
   text += fmt::format("The probe travelled {:.3g} mm and felt {:.3g} N on average, {:.3g} N at most. It {}. ",
                       1e3 * m.ticks.length, m.force.mean, m.force.max, height_words(m));
+  if (m.torque.max > 0.0)
+    text += fmt::format("About its grip the tool was turned with {:.3g} mN m on average, {:.3g} mN m at most. ",
+                        1e3 * m.torque.mean, 1e3 * m.torque.max);
   if (m.follow.samples > 0) {
     text += fmt::format(
         "Its follow error, the way it strayed from the isosurface's value, was {} of the volume's largest "

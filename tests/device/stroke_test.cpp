@@ -67,6 +67,22 @@ TEST(Stroke, LineOnThePlaneHasItsLengthAndTiming) {
   EXPECT_NEAR((path.pose(Seconds(100.0)).target - Vec3(0.02, 0.005, 0.0)).norm(), 0.0, 1e-12);
 }
 
+TEST(Stroke, ABallIsLedByItsLowestPoint) {
+  for (const double radius : {2e-4, 1e-3, 1e-2}) {
+    StrokeSettings s = line_settings(0.04);
+    s.depth = 3e-4;
+    s.approach_height = 0.004;
+    s.approach_speed = 0.02;
+    s.tip_radius = radius;
+    const StrokePath path = build_stroke(s, on_plane).value();
+    EXPECT_NEAR(path.pose(Seconds(0.0)).height - radius, 0.004, 1e-12);
+    EXPECT_NEAR(path.pose(path.contact_begin()).height - radius, -3e-4, 1e-12);
+    EXPECT_NEAR(path.contact_begin().count(), 0.0043 / 0.02, 1e-12) << "it goes as fast and as far as a point";
+    s.press = PressMode::force;
+    EXPECT_NEAR(build_stroke(s, on_plane)->pose(path.contact_begin()).height, radius, 1e-12);
+  }
+}
+
 TEST(Stroke, CircleOnThePlaneIsRoundAndClosed) {
   StrokeSettings s = of_type(StrokeType::circle);
   s.centre = Vec3(0.01, 0.02, 0.03);
@@ -231,6 +247,7 @@ TEST(Stroke, EachBadSettingIsNamed) {
   };
   using S = StrokeSettings;
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.start.x() = nan; }), "start");
+  EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.tip_radius = -1e-3; }), "tip_radius");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.end = s.start; }), "line");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.end = s.start + Vec3::UnitY(); }), "line");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.speed = 0.0; }), "speed");

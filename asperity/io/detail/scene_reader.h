@@ -60,9 +60,11 @@ Result<ScenePart<HandImpedance>> read_hand(const SceneJson& json, const std::str
 /// The scene's `probe` object.
 struct ProbeSettings {
   bool dynamic = false;
-  double radius = 0.0;   ///< m
-  double tip = 0.0;      ///< m: of the ball whose path a point follows on coats with levels of detail
-  double rate = 1000.0;  ///< Hz
+  double radius = 0.0;             ///< m
+  double tip = 0.0;                ///< m: of the ball whose path a point follows on coats with levels of detail
+  double tool_length = 0.0;        ///< m: from the tip to where the hand holds it; 0: no torque
+  Vec3 tool_axis = Vec3::UnitY();  ///< the way there in the probe's own frame, unit
+  double rate = 1000.0;            ///< Hz
   IdealProbeSettings ideal;
   SimulatedDeviceSettings simulated;
 };

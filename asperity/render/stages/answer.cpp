@@ -31,9 +31,20 @@ Vec3 handed_over(Tick& tick, const Vec3& force) noexcept {
 void to_hand(const View& view, ForceSample& out) noexcept {
   const auto turn = [&](Vec3& force) { force = view.orientation.conjugate() * force / view.zoom; };
   turn(out.wrench.force);
-  turn(out.wrench.torque);
   turn(out.parts.friction);
   turn(out.parts.texture);
+  // Its arm is as much longer in the hand as its force is weaker.
+  out.wrench.torque = view.orientation.conjugate() * out.wrench.torque;
+}
+
+/// What has been about the tip, about where the hand holds the tool.
+void to_grip(const SceneSettings& settings, const Quat& orientation, Wrench& wrench) noexcept {
+  if (settings.tool_length == 0.0) {
+    wrench.torque = Vec3::Zero();
+    return;
+  }
+  const Vec3 from_grip = -settings.tool_length * (orientation * settings.tool_axis);
+  wrench.torque += from_grip.cross(wrench.force);
 }
 
 }  // namespace
@@ -52,6 +63,7 @@ void answer(Tick& tick) noexcept {
   state.previous_time = tick.probe->time;
   state.workspace_probe = tick.workspace.pose.position;
   if (!tick.direct) to_hand(tick.scene.settings().view, out);
+  to_grip(tick.scene.settings(), tick.workspace.pose.orientation, out.wrench);
 }
 
 }  // namespace asperity
