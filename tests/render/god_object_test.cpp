@@ -120,6 +120,28 @@ Tally campaign(bool with_radius, std::uint64_t seed, int meshes, int ticks_each)
   return tally;
 }
 
+TEST(GodObject, ABallWhoseMiddleIsLedOverEdgesComesToRest) {
+  const auto surface = test::bare(icosphere(2, 0.02));
+  const TriangleMesh& mesh = surface->mesh();
+  Rng rng(12);
+  SurfaceCache cache;
+  for (int i = 0; i < 1500; ++i) {
+    const double radius = std::pow(10.0, rng.uniform(-3.5, -2.5));
+    const Scene scene = test::scene_of(surface, GodObjectLaw{}, test::stiffness, radius);
+    const auto corners = mesh.corners(rng.below(static_cast<std::uint32_t>(mesh.triangles().size())));
+    const Vec3 on = corners[0] + rng.uniform(0.1, 0.9) * (corners[1] - corners[0]);
+    const Vec3 heading = rng.uniform(2e-6, 2e-5) * random_direction(rng);
+    ProxyState state;
+    test::touch(scene, state, 1.5 * on);
+    for (int k = -6; k <= 6; ++k) {
+      // Of the last ticks the one in the middle is on the edge itself.
+      const Vec3 near = surface->index().closest(on + k * heading, infinity).point;
+      const ForceSample felt = test::touch(scene, state, k == 0 ? on : near);
+      ASSERT_FALSE(unfinished(felt.flags)) << "case " << i << ", radius " << radius << ", tick " << k;
+    }
+  }
+}
+
 TEST(GodObject, HalfAMillionPokesAndSlidesOfAPointNeverPassNorStick) {
   const Tally tally = campaign(false, 1, 50, 10000);
   EXPECT_EQ(tally.ticks, 500000);

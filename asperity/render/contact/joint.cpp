@@ -345,12 +345,19 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   double distance = infinity;
   double stride = 1.0;
   Vec3 nearest = solution.proxy;
+  int in_vain = 0;
   const auto remember_nearest = [&] {
-    if ((solution.proxy - goal).squaredNorm() < (nearest - goal).squaredNorm()) nearest = solution.proxy;
+    ++in_vain;
+    if (!((solution.proxy - goal).squaredNorm() < (nearest - goal).squaredNorm())) return;
+    nearest = solution.proxy;
+    in_vain = 0;
   };
   for (int move = 0; move < most_moves && !work_.spent(); ++move) {
     const bool patient = move >= patience;
     if (patient) remember_nearest();
+    // The middle of a ball that is led into an edge: it would roll to and fro over that for ever.
+    solution.converged = radius_ > 0.0 && !facets_ && in_vain > patience;
+    if (solution.converged) break;
     if (patient) earlier = planes;
     planes.clear();
     touched(solution.proxy, planes);

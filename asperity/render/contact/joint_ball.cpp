@@ -152,7 +152,7 @@ double JointSolve::overlap(const PlaneSet& planes, const Vec3& position) noexcep
 
 /// Out of all that a ball overlaps; `around`: planes where it then is. What it has met goes into `met`.
 bool JointSolve::restore(Vec3& position, PlaneSet& around, CutSet& met) noexcept {
-  const double room = found_of_margin * margin();
+  const double room = found_of_margin * (margin() + widest_skin_);
   for (int round = 0; round < most_restores; ++round) {
     around.clear();
     touched(position, around);
@@ -169,7 +169,6 @@ bool JointSolve::restore(Vec3& position, PlaneSet& around, CutSet& met) noexcept
 
 /// Planes around a place, and those of what a ball would come to that went on from there.
 void JointSolve::with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& planes) const noexcept {
-  constexpr double same = 0.9999;
   for (ConstraintPlane cut : cuts) {
     const Vec3 foot = entries_[cut.owner].touch->to_world(cut.contact.point);
     const Vec3 off = position - foot;
@@ -177,10 +176,7 @@ void JointSolve::with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& p
     if (distance > 2.0 * (radius_ + margin()) || distance == 0.0) continue;
     cut.normal = off / distance;
     cut.offset = cut.normal.dot(foot) + radius_;
-    const bool known = std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& plane) {
-      return plane.owner == cut.owner && plane.normal.dot(cut.normal) > same && plane.offset >= cut.offset;
-    });
-    if (!known) planes.push_back(cut);
+    if (!stands_among(cut, planes)) planes.push_back(cut);
   }
 }
 
@@ -242,7 +238,7 @@ bool JointSolve::make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept {
     const double gained = nearer + move.overlapped - move.weight * overlap(there, next);
     bool worth = gained > least_share * move.gain;
     // Near the end what is gained is lost among what overlaps are known to.
-    if (!worth && gained > -move.weight * found_of_margin * margin())
+    if (!worth && gained > -move.weight * found_of_margin * (margin() + widest_skin_))
       worth = (project_onto_planes(move.goal, there, true).point - next).norm() < 0.5 * move.rest;
     if (worth) {
       if (gained > more_than_told * move.gain) move.stiffest = std::max(10.0, 0.1 * move.stiffest);
@@ -264,11 +260,21 @@ bool JointSolve::make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept {
 void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept {
   constexpr int most_moves = 160;
   constexpr double least_room = 0.01;  // of what is worth a move
+  // Where all that pulls is held, but for next to nothing, moves that come no nearer by as much are none.
+  constexpr int look_after = 12;
+  constexpr double least_gain = 1e-5;
+  double looked_at = infinity;
   BallMove move{.goal = goal, .room = longest_stride * radius_};
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
   for (int i = 0; i < most_moves && !work_.spent(); ++i) {
-    const bool on = plan(solution.proxy, solution.planes, move);
+    bool on = plan(solution.proxy, solution.planes, move);
+    if (on && i % look_after == look_after - 1) {
+      const double distance = (solution.proxy - goal).norm();
+      on = distance < looked_at * (1.0 - least_gain);
+      looked_at = distance;
+      if (!on) move.room = 0.0;
+    }
     if (on && (make(move, solution.proxy, solution.planes) || move.room > least_room * tolerance_)) continue;
     // At rest, or no move comes nearer: by all that is known to hold it.
     solution.planes = move.around;
