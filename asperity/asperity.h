@@ -17,6 +17,7 @@
 #include "asperity/core/option.h"
 #include "asperity/core/parallel_for.h"
 #include "asperity/core/place.h"
+#include "asperity/core/principal_axes.h"
 #include "asperity/core/processor.h"
 #include "asperity/core/progress.h"
 #include "asperity/core/result.h"

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
+#include "asperity/core/principal_axes.h"
 #include "asperity/render/contact/joint.h"
 
 namespace asperity {
@@ -31,26 +30,18 @@ struct Metric {
 };
 
 Metric metric_of(const Mat3& hessian, double stiffest) noexcept {
-  Eigen::SelfAdjointEigenSolver<Mat3> solver;
-  solver.computeDirect(hessian);
-  const Vec3 curvature = solver.eigenvalues().cwiseMax(least_curvature).cwiseMin(stiffest);
-  const Mat3& axes = solver.eigenvectors();
-  Metric metric;
-  metric.inverse_root = axes * curvature.cwiseSqrt().cwiseInverse().asDiagonal() * axes.transpose();
-  metric.matrix = axes * curvature.asDiagonal() * axes.transpose();
-  return metric;
+  const PrincipalAxes principal = principal_axes(hessian);
+  const Vec3 curvature = principal.values.cwiseMax(least_curvature).cwiseMin(stiffest);
+  return {principal.scaling_by(curvature.cwiseSqrt().cwiseInverse()), principal.scaling_by(curvature)};
 }
 
 /// How the direction from a surface changes with the place at a distance from it, by how it changes on the surface.
 Mat3 bend_at_distance(const Mat3& bend, double distance) noexcept {
   // Where it bends towards the place as much as a ball around that, it is as good as a corner.
   constexpr double least = 1e-6;
-  Eigen::SelfAdjointEigenSolver<Mat3> solver;
-  solver.computeDirect(bend);
-  const Vec3 curvature = solver.eigenvalues();
-  const Vec3 grown = curvature.array() / (1.0 + distance * curvature.array()).max(least);
-  const Mat3& axes = solver.eigenvectors();
-  return axes * grown.asDiagonal() * axes.transpose();
+  const PrincipalAxes principal = principal_axes(bend);
+  const Vec3& curvature = principal.values;
+  return principal.scaling_by(curvature.array() / (1.0 + distance * curvature.array()).max(least));
 }
 
 }  // namespace
