@@ -266,8 +266,8 @@ TEST(ReliefSearch, of_a_ball_that_lies_along_a_narrow_crest_no_place_is_missed) 
     const double turn = rng.uniform(0.0, std::numbers::pi);
     const double bend = 1.0 / (radius * (1.0 + std::pow(10.0, rng.uniform(-4.0, -2.0))));
     const double sharp = 1.0 / rng.uniform(3e-5, 2e-4);
-    const double wave = rng.uniform(1e-4, 3e-4);
-    const double ripple = std::pow(10.0, rng.uniform(-8.0, -6.5));
+    const double wave = rng.uniform(5e-5, 1.5e-4);
+    const double ripple = std::pow(10.0, rng.uniform(-8.5, -7.0));
     const HeightMap map = map_of(256, [&](double s, double t) {
       const Vec2 at = tile * Vec2(s - 0.5, t - 0.5);
       const double along = std::clamp(std::cos(turn) * at.x() + std::sin(turn) * at.y(), -4e-4, 4e-4);
