@@ -24,7 +24,7 @@ Status require_finite(const Vec3& value, const std::string& place) {
 Status validate_motion(const StrokeSettings& s) {
   ASPERITY_CHECK(require(s.speed > 0.0, "speed", s.speed, "a speed above 0 (m/s)"));
   ASPERITY_CHECK(require(s.approach_speed > 0.0, "approach_speed", s.approach_speed, "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(require(s.tip_radius >= 0.0, "tip_radius", s.tip_radius, "a length of 0 or more (m)"));
+  ASPERITY_CHECK(require(s.probe_radius >= 0.0, "probe_radius", s.probe_radius, "a length of 0 or more (m)"));
   ASPERITY_CHECK(require(s.approach_height >= 0.0, "approach_height", s.approach_height, "a length of 0 or more (m)"));
   ASPERITY_CHECK(s.press == PressMode::force
                      ? require(s.normal_force > 0.0, "normal_force", s.normal_force, "a force above 0 (N)")
@@ -314,8 +314,8 @@ class StrokeBuilder {
     const StrokeSettings& s = settings_;
     path_.press_ = s.press;
     path_.normal_force_ = s.normal_force;
-    path_.contact_height_ = s.tip_radius - (s.press == PressMode::depth ? s.depth : 0.0);
-    path_.approach_height_ = s.tip_radius + s.approach_height;
+    path_.contact_height_ = s.probe_radius - (s.press == PressMode::depth ? s.depth : 0.0);
+    path_.approach_height_ = s.probe_radius + s.approach_height;
     path_.approach_speed_ = s.approach_speed;
     path_.speed_ = s.speed;
     path_.back_and_forth_ = s.back_and_forth;

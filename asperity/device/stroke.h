@@ -67,9 +67,9 @@ struct StrokeSettings {
   // A recorded stroke is followed as it is: it brings its own speed, depth and approach, and is not repeated.
   double speed = 0.02;  ///< along the surface (m/s), above 0
   PressMode press = PressMode::depth;
-  double depth = 0.001;            ///< PressMode::depth (m); negative stays above the surface
-  double tip_radius = 0.0;         ///< of the ball that is led (m), 0 or more: its lowest point is at depth or height
-  double normal_force = 1.0;       ///< PressMode::force (N), above 0
+  double depth = 0.001;       ///< PressMode::depth (m); negative stays above the surface
+  double probe_radius = 0.0;  ///< of the ball that is led (m), 0 or more: depths and heights are its lowest point's
+  double normal_force = 1.0;  ///< PressMode::force (N), above 0
   double approach_height = 0.005;  ///< above the surface, where the stroke starts and ends (m), 0 or more
   double approach_speed = 0.02;    ///< towards and away from the surface (m/s), above 0
   int repeats = 1;                 ///< traversals; 1 or more
@@ -99,9 +99,9 @@ struct StrokePose {
 
 /// Immutable: a dense polyline on the surface, by arc length, and the timing over it.
 ///
-/// The stroke starts at `approach_height` over its first point, goes straight down to the depth (press depth) or to the
-/// surface (press force), follows the surface at constant speed and goes straight up again. Positions are continuous;
-/// velocity jumps where one phase ends and at corners.
+/// Led by its lowest point the probe starts at `approach_height` over the stroke's first point, goes straight down to
+/// the depth (press depth) or to the surface (press force), follows the surface at constant speed and goes straight up
+/// again. Positions are continuous; velocity jumps where one phase ends and at corners.
 class StrokePath {
  public:
   /// An empty path: no length, no duration, its pose the origin and done. Others come from build_stroke().

@@ -221,9 +221,7 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   note_detail(instances, settings, context);
   ASPERITY_TRY(ScenePart<StrokeSettings> stroke,
                read_stroke(root.raw("stroke"), "stroke", in_workspace(settings.view, bounds), context));
-  const auto takes_ball = [](const Instance& instance) { return instance.law.constrains(); };
-  // What touches with a point touches with the tip's middle.
-  if (std::any_of(instances.begin(), instances.end(), takes_ball)) stroke.value.tip_radius = settings.probe_radius;
+  stroke.value.probe_radius = bodiless ? 0.0 : settings.probe_radius;
   const SceneJson* stroke_json = root.raw("stroke");
   const auto says = [&](const char* key) { return stroke_json != nullptr && stroke_json->contains(key); };
   if (bodiless && !says("depth") && !says("normal_force") && !says("path")) {

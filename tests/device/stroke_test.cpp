@@ -73,7 +73,7 @@ TEST(Stroke, ABallIsLedByItsLowestPoint) {
     s.depth = 3e-4;
     s.approach_height = 0.004;
     s.approach_speed = 0.02;
-    s.tip_radius = radius;
+    s.probe_radius = radius;
     const StrokePath path = build_stroke(s, on_plane).value();
     EXPECT_NEAR(path.pose(Seconds(0.0)).height - radius, 0.004, 1e-12);
     EXPECT_NEAR(path.pose(path.contact_begin()).height - radius, -3e-4, 1e-12);
@@ -247,7 +247,7 @@ TEST(Stroke, EachBadSettingIsNamed) {
   };
   using S = StrokeSettings;
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.start.x() = nan; }), "start");
-  EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.tip_radius = -1e-3; }), "tip_radius");
+  EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.probe_radius = -1e-3; }), "probe_radius");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.end = s.start; }), "line");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.end = s.start + Vec3::UnitY(); }), "line");
   EXPECT_EQ(place(StrokeType::line, [&](S& s) { s.speed = 0.0; }), "speed");
