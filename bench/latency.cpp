@@ -35,6 +35,7 @@ struct Options {
   std::size_t cold_updates = 200;
   std::size_t counted = 0;  ///< ticks a row for a tool that counts; 0: timed
   RealEffort real;
+  std::vector<double> radii = {0.0, 0.2, 0.5, 1.0, 3.0, 10.0};  ///< mm: of --only ball
 };
 
 void say(const std::string& what) {
@@ -219,21 +220,24 @@ int main(int argc, char** argv) {
                  "Exit with 1 when a row does not answer or a ratio is far beyond what is owed");
     app.add_flag("--json", options.json, "Print JSON in place of the table");
     app.add_option("--only", options.only,
-                   "One kind of rows: mesh, relief, volume, potential, fine, formula, refit, rays or real")
-        ->check(CLI::IsMember({"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "rays", "real"}));
-    app.add_option("--data", options.real.data, "real, rays: folder of meshes, textures and volumes")
+                   "One kind of rows: mesh, relief, volume, potential, fine, formula, refit, rays, real or ball")
+        ->check(CLI::IsMember(
+            {"mesh", "relief", "volume", "potential", "fine", "formula", "refit", "rays", "real", "ball"}));
+    app.add_option("--data", options.real.data, "real, ball, rays: folder of meshes, textures and volumes")
         ->capture_default_str();
-    app.add_option("--passes", options.real.passes, "real: times that each tick is timed, of which the least counts")
+    app.add_option("--passes", options.real.passes,
+                   "real, ball: times that each tick is timed, of which the least counts")
         ->check(CLI::Range(1, 100));
-    app.add_option("--ticks", options.real.ticks, "real: ticks a row")
+    app.add_option("--ticks", options.real.ticks, "real, ball: ticks a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();
     app.add_option("--rows", options.real.only,
-                   "real: rows whose \"body, stroke, law\" holds this text; rays: whose body does");
+                   "real, ball: rows whose \"body, stroke, law\" holds this text; rays: whose body does");
     app.add_flag_callback(
-        "--long", [&] { options.real.ticks = 1000000; }, "real: a million ticks a row");
-    app.add_option("--budget", options.real.budget, "real: of a tick, in evaluations; 0: no limit");
-    app.add_flag("--every", options.real.every, "real: every pair of strokes and laws");
+        "--long", [&] { options.real.ticks = 1000000; }, "real, ball: a million ticks a row");
+    app.add_option("--budget", options.real.budget, "real, ball: of a tick, in evaluations; 0: no limit");
+    app.add_flag("--every", options.real.every, "real, ball: every pair of strokes and laws");
+    app.add_option("--radii", options.radii, "ball: of the probe (mm)")->check(CLI::Range(0.0, 100.0));
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();
@@ -252,7 +256,10 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& problem) {
       return app.exit(problem) == 0 ? 0 : 2;
     }
-    return options.only == "real" ? run_real(options) : run(options, command);
+    if (options.only == "ball") {
+      for (const double radius : options.radii) options.real.radii.push_back(1e-3 * radius);
+    }
+    return options.only == "real" || options.only == "ball" ? run_real(options) : run(options, command);
   } catch (const std::exception& problem) {
     std::fprintf(stderr, "latency: %s\n", problem.what());
     return 2;

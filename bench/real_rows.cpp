@@ -169,8 +169,8 @@ Motion motion_of(const std::string& stroke, std::size_t tick, double highest, Rn
 }
 
 /// Where the probe is at each tick. Places move along the carrier; the normal that depths are measured by follows
-/// slowly, so that facets are not felt in the probe's own path.
-std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highest, std::size_t ticks,
+/// slowly, so that facets are not felt in the probe's own path. Depths are those of a ball's lowest point.
+std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highest, double radius, std::size_t ticks,
                       std::uint64_t seed, bool across_wall) {
   Rng rng(seed);
   std::vector<Vec3> path;
@@ -220,7 +220,7 @@ std::vector<Vec3> led(const std::string& stroke, Carrier& carrier, double highes
     if (!heading.allFinite()) heading = normal.unitOrthogonal();
     // It comes down from above.
     const double down = std::min(1.0, static_cast<double>(tick - begun) / approach);
-    path.push_back(spot.point - (down * depth - (1.0 - down) * (highest + 1e-3)) * normal);
+    path.push_back(spot.point + (radius - down * depth + (1.0 - down) * (highest + 1e-3)) * normal);
   }
   return path;
 }
@@ -250,7 +250,7 @@ struct LedProbe {
   const Scene& scene;
   const std::vector<Vec3>& path;
   ProxyState state = {};
-  ProxyCache cache = {};
+  ProxyCache cache = ProxyCache(scene);
 
   [[nodiscard]] ProbeSample probe(std::size_t tick) const {
     ProbeSample probe;
@@ -333,7 +333,7 @@ void run(const Scene& scene, const std::vector<Vec3>& path, int passes, double c
   LedProbe led{scene, path};
   const auto start = [&] {
     led.state = {};
-    led.cache = {};
+    led.cache = ProxyCache(scene);
   };
   const auto update = [&](std::size_t tick) { return led.go(tick).flags.has(TickFlag::contact); };
   const std::size_t slowest = run_passes(path.size(), passes, clock_cost, start, update, row);
@@ -353,7 +353,7 @@ void run_bare(const Scene& scene, const std::vector<Vec3>& path, double clock_co
   LedProbe led{scene, path};
   const auto start = [&] {
     led.state = {};
-    led.cache = {};
+    led.cache = ProxyCache(scene);
     row.not_converged = 0;
   };
   const auto update = [&](std::size_t tick) {
@@ -365,7 +365,9 @@ void run_bare(const Scene& scene, const std::vector<Vec3>& path, double clock_co
 }
 
 /// What goes with a body.
-std::vector<std::string> laws_for(const Body& body) {
+std::vector<std::string> laws_for(const Body& body, bool balls) {
+  if (body.bare && balls) return {bare_law};
+  if (balls) return {"proxy", "proxy, friction"};
   if (body.name == "bunny, potential") return {"proxy", "virtual-contact-point", "magnetic"};
   if (body.bare) return {bare_law, peer_law};
   if (body.volume) return {"proxy", "cross-uncross", "avila"};
@@ -384,10 +386,60 @@ Result<Experiment> read(const Body& body, const std::string& law, const std::fil
   return parse_experiment(scene, data, body.name);
 }
 
+/// A stroke and a law.
+using Pair = std::pair<std::string, std::string>;
+
+/// Of the body with this number. Every stroke by one law at least, the proxy by every second; so that all pairs of
+/// strokes and laws come up.
+std::vector<Pair> pairs_of(const Body& body, std::size_t number, bool balls, bool every) {
+  const std::vector<std::string> laws = laws_for(body, balls);
+  std::vector<Pair> pairs;
+  for (std::size_t s = 0; s < std::size(real_strokes); ++s) {
+    if (every || body.bare) {
+      for (const std::string& law : laws) pairs.emplace_back(real_strokes[s], law);
+    } else if (balls) {
+      pairs.emplace_back(real_strokes[s], laws[(number + s) % laws.size()]);
+    } else {
+      if ((number + s) % 2 == 0) pairs.emplace_back(real_strokes[s], "proxy");
+      if ((number + s) % 3 == 0) pairs.emplace_back(real_strokes[s], laws[1 + (number + s / 3) % (laws.size() - 1)]);
+    }
+  }
+  if (!body.bare) pairs.emplace_back("beside a wall", "proxy");
+  std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return pairs;
+}
+
+/// Of a body as an experiment's scene holds it.
+Status measure_row(const Body& body, const Experiment& experiment, const RealEffort& effort, double clock_cost,
+                   RealRow& row) {
+  const std::span<const Instance> read_instances = experiment.scene.instances();
+  std::vector<Instance> instances(read_instances.begin(), read_instances.end());
+  Carrier carrier(instances.front());
+  std::string led_as = row.stroke;
+  if (row.stroke == "beside a wall") {
+    ASPERITY_TRY(Instance wall, wall_through(carrier.bounds()));
+    instances.push_back(std::move(wall));
+    led_as = "raster";
+  }
+  SceneSettings settings;
+  settings.budget = effort.budget;
+  settings.probe_radius = row.radius;
+  ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), settings));
+  const std::vector<Vec3> path = led(led_as, carrier, body.highest, row.radius, effort.ticks, 17, led_as != row.stroke);
+  if (body.bare) {
+    run_bare(scene, path, clock_cost, row);
+  } else {
+    run(scene, path, effort.passes, clock_cost, row);
+  }
+  return success();
+}
+
 }  // namespace
 
 Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock_cost,
                                           const std::function<void(std::string_view)>& told) {
+  const bool balls = !effort.radii.empty();
+  const std::vector<double> radii = balls ? effort.radii : std::vector<double>{0.0};
   std::vector<RealRow> rows;
   std::size_t number = 0;
   for (const Body& body : bodies()) {
@@ -395,28 +447,12 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
       told(fmt::format("{}: skipped, {} is not there", body.name, (effort.data / body.file).string()));
       continue;
     }
-    const std::vector<std::string> laws = laws_for(body);
-    // Every stroke by one law at least, the proxy by every second; so that all pairs of strokes and laws come up.
-    std::vector<std::pair<std::string, std::string>> pairs;
-    for (std::size_t s = 0; s < std::size(real_strokes); ++s) {
-      if (effort.every || body.bare) {
-        for (const std::string& law : laws) pairs.emplace_back(real_strokes[s], law);
-      } else {
-        if ((number + s) % 2 == 0) pairs.emplace_back(real_strokes[s], "proxy");
-        if ((number + s) % 3 == 0) pairs.emplace_back(real_strokes[s], laws[1 + (number + s / 3) % (laws.size() - 1)]);
-      }
-    }
-    if (!body.bare) pairs.emplace_back("beside a wall", "proxy");
+    const std::vector<Pair> pairs = pairs_of(body, number, balls, effort.every);
     // Rows of the others stay the same.
     if (!body.bare) ++number;
     std::optional<Experiment> read_by;
     std::string last_law;
-    std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     for (const auto& [stroke, law] : pairs) {
-      RealRow row;
-      row.body = body.name;
-      row.stroke = stroke;
-      row.law = law;
       if (!effort.only.empty() &&
           fmt::format("{}, {}, {}", body.name, stroke, law).find(effort.only) == std::string::npos)
         continue;
@@ -424,27 +460,18 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
         ASPERITY_TRY(read_by, read(body, law, effort.data));
         last_law = law;
       }
-      const std::span<const Instance> read_instances = read_by->scene.instances();
-      std::vector<Instance> instances(read_instances.begin(), read_instances.end());
-      Carrier carrier(instances.front());
-      std::string led_as = stroke;
-      if (stroke == "beside a wall") {
-        ASPERITY_TRY(Instance wall, wall_through(carrier.bounds()));
-        instances.push_back(std::move(wall));
-        led_as = "raster";
+      for (const double radius : radii) {
+        RealRow row;
+        row.body = body.name;
+        row.stroke = stroke;
+        row.law = law;
+        row.radius = radius;
+        if (const Status done = measure_row(body, *read_by, effort, clock_cost, row); !done) return done.error();
+        told(fmt::format("{}, {}, {}{}: p50 {:.2f} us, p99.9 {:.1f}, worst {:.1f} us again {:.1f}", body.name, stroke,
+                         law, balls ? fmt::format(", {:g} mm", 1e3 * radius) : "", 1e-3 * row.times.p50,
+                         1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
+        rows.push_back(std::move(row));
       }
-      SceneSettings settings;
-      settings.budget = effort.budget;
-      ASPERITY_TRY(const Scene scene, Scene::build(std::move(instances), settings));
-      const std::vector<Vec3> path = led(led_as, carrier, body.highest, effort.ticks, 17, led_as != stroke);
-      if (body.bare) {
-        run_bare(scene, path, clock_cost, row);
-      } else {
-        run(scene, path, effort.passes, clock_cost, row);
-      }
-      told(fmt::format("{}, {}, {}: p99.9 {:.1f} us, worst {:.1f} us again {:.1f}", body.name, stroke, law,
-                       1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again));
-      rows.push_back(std::move(row));
     }
   }
   return rows;
@@ -480,6 +507,56 @@ std::string sum_up(const std::string& of, const std::vector<RealRow>& rows) {
                      longest);
 }
 
+constexpr const char* bodies_of_sums[] = {"bunny-28k", "spot",   "FlightHelmet",     "vase",
+                                          "carotid",   "cavity", "bunny, potential", ""};
+
+/// Of balls of each radius on each kind of body: how often a tick is late, and the median beside that of the same row
+/// by a point.
+std::string beside_points(const std::vector<RealRow>& rows) {
+  constexpr double late_p999 = 50e3;  // ns
+  constexpr double late_worst = 200e3;
+  std::string text = fmt::format("Rows in time: p99.9 at most {:g} us, the slowest tick {:g} us.\n{:<16} {:>9} {:>5} ",
+                                 1e-3 * late_p999, 1e-3 * late_worst, "body", "radius mm", "rows");
+  text += fmt::format("{:>12} {:>12} {:>12} {:>14} {:>13} {:>14} {:>8} {:>8}\n", "median p50", "dearest p50",
+                      "median/point", "dearest p99.9", "p99.9 kept", "dearest tick", "kept", "not c.");
+  std::vector<double> radii;
+  for (const RealRow& row : rows) {
+    if (std::find(radii.begin(), radii.end(), row.radius) == radii.end()) radii.push_back(row.radius);
+  }
+  for (const std::string of : bodies_of_sums) {
+    for (const double radius : radii) {
+      std::vector<double> p50;
+      std::vector<double> ratio;
+      std::size_t in_time = 0;
+      std::size_t in_time_at_worst = 0;
+      std::size_t not_converged = 0;
+      double p999 = 0.0;
+      double worst = 0.0;
+      for (const RealRow& row : rows) {
+        if (row.radius != radius || !row.body.starts_with(of)) continue;
+        const auto point = std::find_if(rows.begin(), rows.end(), [&](const RealRow& one) {
+          return one.radius == 0.0 && one.body == row.body && one.stroke == row.stroke && one.law == row.law;
+        });
+        p50.push_back(row.times.p50);
+        if (point != rows.end()) ratio.push_back(row.times.p50 / std::max(1.0, point->times.p50));
+        in_time += row.times.p999 <= late_p999 ? 1U : 0U;
+        in_time_at_worst += row.worst_again <= late_worst ? 1U : 0U;
+        not_converged += row.not_converged;
+        p999 = std::max(p999, row.times.p999);
+        worst = std::max(worst, row.worst_again);
+      }
+      if (p50.empty()) continue;
+      std::sort(p50.begin(), p50.end());
+      std::sort(ratio.begin(), ratio.end());
+      const auto median = [](const std::vector<double>& all) { return all.empty() ? 0.0 : all[all.size() / 2]; };
+      text += fmt::format("{:<16} {:>9g} {:>5} {:>12.2f} {:>12.2f} {:>12.2f} {:>14.1f} {:>13} {:>14.1f} {:>8} {:>8}\n",
+                          of.empty() ? "all" : of, 1e3 * radius, p50.size(), 1e-3 * median(p50), 1e-3 * p50.back(),
+                          median(ratio), 1e-3 * p999, in_time, 1e-3 * worst, in_time_at_worst, not_converged);
+    }
+  }
+  return text;
+}
+
 /// Bare meshes: the god-object's p99.9 against Embree's.
 std::string beside_embree(const std::vector<RealRow>& rows) {
   std::string text;
@@ -501,28 +578,30 @@ std::string beside_embree(const std::vector<RealRow>& rows) {
 }  // namespace
 
 std::string real_text(const std::vector<RealRow>& rows) {
+  const bool balls = std::any_of(rows.begin(), rows.end(), [](const RealRow& row) { return row.radius > 0.0; });
   std::string text = fmt::format(
       "{:<32} {:<16} {:<24} {:>7} {:>8} {:>9} {:>9} {:>9} {:>6} {:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6}\n", "body",
-      "stroke", "law", "p50 us", "p99", "p99.9", "max", "worst*", "w99.9", "w max", "in %", "not c.", "open", "run",
-      "e.lim.", "jump N");
+      "stroke", balls ? "law, radius" : "law", "p50 us", "p99", "p99.9", "max", "worst*", "w99.9", "w max", "in %",
+      "not c.", "open", "run", "e.lim.", "jump N");
   for (const RealRow& row : rows) {
     text += fmt::format(
         "{:<32} {:<16} {:<24} {:>7.2f} {:>8.2f} {:>9.2f} {:>9.1f} {:>9.1f} {:>6} {:>6} {:>5.0f} {:>6} {:>6} {:>5} "
         "{:>6} {:>6.2f}\n",
-        row.body, row.stroke, row.law, 1e-3 * row.times.p50, 1e-3 * row.times.p99, 1e-3 * row.times.p999,
-        1e-3 * row.times.max, 1e-3 * row.worst_again, row.work_p999, row.work_max, 100.0 * row.contact_share,
-        row.not_converged, row.open, row.longest_open, row.limited, row.largest_jump);
+        row.body, row.stroke, balls ? fmt::format("{}, {:g} mm", row.law, 1e3 * row.radius) : row.law,
+        1e-3 * row.times.p50, 1e-3 * row.times.p99, 1e-3 * row.times.p999, 1e-3 * row.times.max, 1e-3 * row.worst_again,
+        row.work_p999, row.work_max, 100.0 * row.contact_share, row.not_converged, row.open, row.longest_open,
+        row.limited, row.largest_jump);
   }
   text +=
       "p50 to max: of each tick the least of some passes. * the slowest tick again from its state, caches empty and 64 "
       "MB swept before: the least of 20 times. w: work, "
       "in evaluations. open: "
-      "ticks whose budget was spent, run: one after the other.\n\n"
-      "Rows in time: p99.9 at most 20 us, the slowest tick 100 us; at 5 m/s 50 and 200 us.\n";
+      "ticks whose budget was spent, run: one after the other.\n\n";
+  if (balls) return text + beside_points(rows);
+  text += "Rows in time: p99.9 at most 20 us, the slowest tick 100 us; at 5 m/s 50 and 200 us.\n";
   text += fmt::format("{:<16} {:>5} {:>12} {:>14} {:>13} {:>14} {:>8} {:>8} {:>8}\n", "body", "rows", "p99.9 kept",
                       "dearest p99.9", "slowest kept", "dearest tick", "not c.", "open", "run");
-  for (const char* body : {"bunny-28k", "spot", "FlightHelmet", "vase", "carotid", "cavity", "bunny, potential", ""})
-    text += sum_up(body, rows);
+  for (const char* body : bodies_of_sums) text += sum_up(body, rows);
   return text + beside_embree(rows);
 }
 

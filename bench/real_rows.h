@@ -20,6 +20,7 @@ struct RealRow {
   std::string body;
   std::string stroke;
   std::string law;
+  double radius = 0.0;            ///< m, of the probe
   Latency times;                  ///< ns, of each tick the least of all passes
   double worst_again = 0.0;       ///< ns: the slowest tick from its state, caches empty and cold, the least of 20 times
   double contact_share = 0.0;     ///< of the ticks
@@ -39,6 +40,8 @@ struct RealEffort {
   int passes = 3;                                 ///< that each tick is timed in, of which the least counts
   std::string only;                               ///< rows whose "body, stroke, law" holds this text; empty: all
   std::optional<std::uint32_t> budget;            ///< of each tick; 0: no limit
+  /// m, of the probe, for rows by laws that take a ball; none: points, by all laws.
+  std::vector<double> radii;
   bool every = false;  ///< all pairs of bodies, strokes and laws; otherwise each body meets some of them
 };
 
@@ -47,7 +50,7 @@ struct RealEffort {
 Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock_cost,
                                           const std::function<void(std::string_view)>& told);
 
-/// As a table. [build]
+/// As a table; of balls beside the same rows by a point, where those are among them. [build]
 std::string real_text(const std::vector<RealRow>& rows);
 
 }  // namespace asperity::bench

@@ -285,7 +285,7 @@ TEST(ReliefSearch, of_a_ball_that_lies_along_a_narrow_crest_no_place_is_missed) 
       p.z() += radius - view.nearest(p, infinity).distance;
       const Foot nearest = view.nearest(p, infinity);
       ContactSet feet;
-      view.feet(p, 1.001 * radius, 1.02 * radius, feet);
+      view.feet(p, {1.001 * radius, 1.02 * radius}, feet);
       ASSERT_FALSE(feet.empty());
       several += feet.size() > 1 ? 1 : 0;
       ASSERT_LE(feet[0].distance - nearest.distance, 1e-6 * radius) << "case " << i << ", " << k;
@@ -334,7 +334,7 @@ TEST(ReliefSearch, feet_are_all_places_that_a_ball_may_rest_on) {
       const Foot nearest = surface.view(cache).nearest(p, infinity);
       if (i % 3 == 0) p = nearest.point + rng.uniform(0.999, 1.0) * reach * (p - nearest.point).normalized();
       ContactSet feet;
-      surface.view(cache).feet(p, reach, reach, feet);
+      surface.view(cache).feet(p, {reach, reach}, feet);
       several += feet.size() > 1 ? 1 : 0;
       // Each of them is one: nothing around it is nearer.
       for (const Foot& foot : feet) {
@@ -407,8 +407,8 @@ TEST(ReliefSearch, feet_are_the_same_to_the_bit_whatever_is_kept_of_earlier_look
       if (i % 3 != 2) p += 0.1 * reach * random_direction(rng);
       ContactSet here;
       ContactSet expected;
-      one.surface->view(with, moment).feet(p, reach, reach, here);
-      one.surface->view(without, moment).feet(p, reach, reach, expected);
+      one.surface->view(with, moment).feet(p, {reach, reach}, here);
+      one.surface->view(without, moment).feet(p, {reach, reach}, expected);
       ASSERT_EQ(here.size(), expected.size()) << one.name << ", case " << i;
       ASSERT_EQ(work_with.done().sum(), work_without.done().sum()) << one.name << ", case " << i;
       felt += expected.empty() ? 0 : 1;

@@ -9,6 +9,10 @@ namespace asperity {
 namespace {
 
 constexpr int most_attempts = 4;
+// Of what a ball overlaps, a look tells so many places, and of what it overlaps most this share: three hold it, and
+// pushed out of these it is looked again.
+constexpr std::size_t most_feet = 12;
+constexpr double deepest_share = 0.5;
 // Between two walls a ball is pushed from one to the other, each time by less.
 constexpr int most_pushes = 12;
 // On a relief a move of this share of its finest grain is not worth making, on what bends smoothly of this one; on
@@ -56,6 +60,14 @@ bool JointSolve::complete() const noexcept {
   return all;
 }
 
+bool JointSolve::tells_all_feet(const Entry& entry) const noexcept {
+  return radius_ > 0.0 && entry.smooth && std::holds_alternative<ReliefView>(entry.touch->view);
+}
+
+bool JointSolve::rolls(const ConstraintPlane& plane) const noexcept {
+  return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
+}
+
 bool JointSolve::foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept {
   Entry& entry = entries_[index];
   const Touched& touch = *entry.touch;
@@ -86,7 +98,7 @@ bool JointSolve::plane_off(std::size_t index, const Vec3& local, const Foot& foo
 
 /// Of a relief, planes that keep the ball off all that it touches or would on the next step from here.
 const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position) noexcept {
-  const double beyond = std::clamp(stride_, 0.02 * radius_, 0.25 * radius_);
+  const double beyond = std::clamp(stride_, 0.006 * radius_, 0.25 * radius_);
   if (last_feet_.index == index && last_feet_.position == position && last_feet_.beyond == beyond)
     return last_feet_.planes;
   last_feet_.index = index;
@@ -97,7 +109,10 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
   const Vec3 local = entry.touch->to_local(position);
   ContactSet feet;
   const double touching = radius_ + gap(entry) + 2.0 * entry.skin;
-  std::get_if<ReliefView>(&entry.touch->view)->feet(local, touching, touching + beyond, feet);
+  std::get_if<ReliefView>(&entry.touch->view)
+      ->feet(local, {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
+             feet);
+  keep_following(index, position, touching + beyond, feet);
   for (std::size_t i = 0; i < feet.size(); ++i) {
     Place place;
     ConstraintPlane plane;
@@ -155,7 +170,11 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
     if (tells_all_feet(entry)) {
-      for (const ConstraintPlane& plane : feet_planes(i, position)) out.push_back(plane);
+      if (following_) {
+        followed_planes(i, position, out);
+      } else {
+        for (const ConstraintPlane& plane : feet_planes(i, position)) out.push_back(plane);
+      }
       continue;
     }
     if (entry.smooth) {
@@ -182,6 +201,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
 }
 
+/// Planes of what is touched, not only near: what friction can hold by.
 void JointSolve::rests_on(const Vec3& position, PlaneSet& out) noexcept {
   touched(position, out);
   for (std::size_t i = out.size(); i-- > 0;) {

@@ -72,6 +72,13 @@ class JointSolve {
     Vec3 point = Vec3::Zero();
     Vec3 normal = Vec3::Zero();  ///< unit, away from the side that is touched
   };
+  /// What a look at a relief has found, to be followed until the next.
+  struct Followed {
+    std::size_t index = 0;
+    Foot foot;
+    Vec3 position = Vec3::Zero();  ///< of the ball, where that was the foot (world)
+    bool stays = false;            ///< the place itself, whatever it is led to
+  };
   using HeldSet = FixedVector<Held, 6>;
   struct Met {
     bool hit = false;
@@ -130,15 +137,16 @@ class JointSolve {
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
 
   /// Whether all places that a ball may rest on are asked for at once.
-  [[nodiscard]] bool tells_all_feet(const Entry& entry) const noexcept {
-    return radius_ > 0.0 && entry.smooth && std::holds_alternative<ReliefView>(entry.touch->view);
-  }
+  [[nodiscard]] bool tells_all_feet(const Entry& entry) const noexcept;
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   [[nodiscard]] bool plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
                                ConstraintPlane& plane) const noexcept;
   [[nodiscard]] const PlaneSet& feet_planes(std::size_t index, const Vec3& position) noexcept;
+  void keep_following(std::size_t index, const Vec3& position, double within, ContactSet& feet) noexcept;
+  [[nodiscard]] bool same_place(std::size_t index, const Foot& a, const Foot& b) const noexcept;
+  void follow(const Followed& one) noexcept;
+  void followed_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept;
   void touched(const Vec3& position, PlaneSet& out) noexcept;
-  /// Those of them that are touched, not only near: what friction can hold by.
   void rests_on(const Vec3& position, PlaneSet& out) noexcept;
   [[nodiscard]] ConstraintPlane plane_of(std::size_t index, const Foot& contact) const noexcept;
   void triangle_planes(std::size_t index, const Vec3& position, double within, PlaneSet& out) noexcept;
@@ -160,15 +168,15 @@ class JointSolve {
   void with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& planes) const noexcept;
   [[nodiscard]] bool plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move) noexcept;
   [[nodiscard]] bool make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept;
+  static void learn(const CutSet& met, BallMove& move) noexcept;
+  [[nodiscard]] bool leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept;
   void settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void share_out(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] bool loosen(const Vec3& position) noexcept;
   /// Whether a ball rests on an edge or corner of a mesh.
-  [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept {
-    return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
-  }
+  [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept;
   [[nodiscard]] Vec3 edge_of(const ConstraintPlane& plane) const noexcept;
 
   double radius_;
@@ -182,9 +190,11 @@ class JointSolve {
     double beyond = 0.0;
     PlaneSet planes;
   } last_feet_;
+  FixedVector<Followed, 48> followed_;
+  bool following_ = false;                ///< nothing is looked for beside these
   FixedVector<ConstraintPlane, 6> feet_;  ///< found while the ball moved
   bool met_ = false;                      ///< the last advance has found more of them
-  double stride_ = 0.0;                   ///< how far that was to go (m)
+  double stride_ = 0.0;                   ///< how far it was to go (m)
   bool smooth_ = false;                   ///< any of them is
   bool facets_ = false;                   ///< any of them is generated
   HeldSet held_;                          ///< a point: what it touches

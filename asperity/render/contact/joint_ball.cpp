@@ -17,6 +17,10 @@ constexpr double farthest_foreseen = 0.02;
 // Curvature that a step reckons with at least, as a share of that of the distance to the goal: where less is left, the
 // place is hardly held, or not at all, and strides are what is long enough.
 constexpr double least_curvature = 0.1;
+// What is further off than this share is not followed.
+constexpr double farthest_followed = 0.3;
+// Feet that are nearer than this share of the radius are led to where they are now, others stay the places they were.
+constexpr double as_near = 2e-3;
 constexpr int most_restores = 8;
 // Of their multipliers, which are what overlaps are worth.
 constexpr double overlap_weighs = 1.5;
@@ -98,6 +102,75 @@ Vec3 JointSolve::bent_step(const PlaneSet& planes, const PlaneProjection& flat, 
   const Vec3 step = metric.inverse_root * project_onto_planes(metric.inverse_root * pull, bent, true).point;
   gain = pull.dot(step) - 0.5 * step.dot(metric.matrix * step);
   return step;
+}
+
+/// After a look that has found `feet` nearer than `within` to a ball at `position`: adds what was followed there and
+/// not found, and follows them all. What is further off stays followed.
+void JointSolve::keep_following(std::size_t index, const Vec3& position, double within, ContactSet& feet) noexcept {
+  const Entry& entry = entries_[index];
+  const Vec3 local = entry.touch->to_local(position);
+  const double farthest = (1.0 + farthest_followed) * radius_;
+  const double near = radius_ + gap(entry) + as_near * radius_;
+  for (std::size_t i = followed_.size(); i-- > 0;) {
+    const Followed& one = followed_[i];
+    if (one.index != index) continue;
+    const double distance = (one.foot.point - local).norm();
+    if (one.stays ? distance <= farthest : distance > within && distance <= farthest) continue;
+    if (!one.stays && distance <= near) {
+      const Foot foot = std::get_if<ReliefView>(&entry.touch->view)->follow(local, one.foot);
+      const bool found =
+          std::any_of(feet.begin(), feet.end(), [&](const Foot& other) { return same_place(index, foot, other); });
+      if (!found) feet.push_back(foot);
+    }
+    followed_.swap_remove(i);
+  }
+  for (const Foot& foot : feet) follow({index, foot, position});
+}
+
+bool JointSolve::same_place(std::size_t index, const Foot& a, const Foot& b) const noexcept {
+  const double same = 1e-2 * entries_[index].grain;
+  return (a.point - b.point).squaredNorm() <= same * same;
+}
+
+void JointSolve::follow(const Followed& one) noexcept {
+  for (Followed& other : followed_) {
+    if (other.index != one.index || other.stays != one.stays || !same_place(one.index, one.foot, other.foot)) continue;
+    other = one;
+    return;
+  }
+  if (followed_.push_back(one)) return;
+  Followed* farthest = std::max_element(followed_.begin(), followed_.end(), [](const Followed& a, const Followed& b) {
+    return a.foot.distance < b.foot.distance;
+  });
+  if (one.foot.distance < farthest->foot.distance) *farthest = one;
+}
+
+/// Planes of what is followed, in place of a look.
+void JointSolve::followed_planes(std::size_t index, const Vec3& position, PlaneSet& out) noexcept {
+  const Entry& entry = entries_[index];
+  const Vec3 local = entry.touch->to_local(position);
+  const double touching = radius_ + gap(entry);
+  const std::size_t before = out.size();
+  for (Followed& one : followed_) {
+    if (one.index != index) continue;
+    const Vec3 off = local - one.foot.point;
+    const double distance = off.norm();
+    // Of what is bent somewhat more than the ball is round, the nearest place may be nearer by as much as that.
+    const double beside = off.cross(one.foot.normal).squaredNorm() / distance;
+    if (distance > touching + 0.25 * radius_) continue;
+    if (!one.stays && position != one.position && distance - 2.0 * beside <= touching + as_near * radius_) {
+      one.foot = std::get_if<ReliefView>(&entry.touch->view)->follow(local, one.foot);
+      one.position = position;
+    } else {
+      one.foot.distance = distance;
+    }
+    const bool met =
+        std::any_of(out.begin() + static_cast<std::ptrdiff_t>(before), out.end(),
+                    [&](const ConstraintPlane& other) { return same_place(index, one.foot, other.contact); });
+    Place place;
+    ConstraintPlane plane;
+    if (!met && plane_off(index, local, one.foot, place, plane)) out.push_back(plane);
+  }
 }
 
 /// How far nothing is in the way of a ball that touches nothing, whichever way it goes, up to `far`.
@@ -203,7 +276,8 @@ bool JointSolve::plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move)
   move.step = bent_step(move.around, move.flat, proxy, move.goal, move.stiffest, move.gain);
   move.length = move.step.norm();
   double longest = move.room;
-  if (move.around.empty() && move.length > longest) longest = std::max(longest, free_around(proxy, move.length));
+  if (move.around.empty() && move.length > longest && !following_)
+    longest = std::max(longest, free_around(proxy, move.length));
   if (move.length > longest) {
     move.step *= longest / move.length;
     move.gain *= longest / move.length;
@@ -214,6 +288,14 @@ bool JointSolve::plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move)
   move.overlapped = move.weight * overlap(move.around, proxy);
   move.gain += move.overlapped;
   return true;
+}
+
+/// What a move that came to nothing has met is kept to from then on.
+void JointSolve::learn(const CutSet& met, BallMove& move) noexcept {
+  for (const ConstraintPlane& plane : met) {
+    if (move.cuts.size() == move.cuts.capacity()) move.cuts.swap_remove(0);
+    move.cuts.push_back(plane);
+  }
 }
 
 /// Makes the move where it comes to enough; learns from it in any case.
@@ -239,12 +321,48 @@ bool JointSolve::make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept {
       return true;
     }
   }
-  for (const ConstraintPlane& plane : met) {
-    if (move.cuts.size() == move.cuts.capacity()) move.cuts.swap_remove(0);
-    move.cuts.push_back(plane);
-  }
+  learn(met, move);
   move.room = 0.3 * move.length;
   move.stiffest *= 10.0;
+  return false;
+}
+
+/// Moves among what is followed alone, and looks around where these have led. False where that is no nearer to the
+/// goal by as much; what is in the way there is followed from then on.
+bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept {
+  constexpr int most_moves = 24;
+  constexpr double least_share = 0.1;
+  BallMove inner{.goal = move.goal, .room = longest_stride * radius_};
+  Vec3 place = proxy;
+  PlaneSet there = planes;
+  bool rests = false;
+  following_ = true;
+  for (int i = 0; i < most_moves && !work_.spent(); ++i) {
+    inner.room = std::min(inner.room, longest_stride * radius_ - (place - proxy).norm());
+    if (inner.room <= tolerance_) break;
+    rests = !plan(place, there, inner);
+    if (rests) break;
+    if (!make(inner, place, there) && inner.room <= 0.01 * tolerance_) break;
+  }
+  following_ = false;
+  if (place == proxy) return false;
+  const auto nearer = [&](const Vec3& next) {
+    return 0.5 * ((proxy - move.goal).squaredNorm() - (next - move.goal).squaredNorm());
+  };
+  const double hoped = nearer(place);
+  CutSet met;
+  stride_ = rests ? 0.0 : farthest_foreseen * radius_;
+  if (restore(place, there, met) && nearer(place) >= least_share * hoped) {
+    proxy = place;
+    planes = there;
+    return true;
+  }
+  for (const ConstraintPlane& plane : met) {
+    if (tells_all_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy, true});
+  }
+  for (const ConstraintPlane& plane : planes) {
+    if (tells_all_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy});
+  }
   return false;
 }
 
@@ -256,6 +374,8 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
   constexpr double least_gain = 1e-5;
   double looked_at = infinity;
   BallMove move{.goal = goal, .room = longest_stride * radius_};
+  constexpr int most_vain_leaps = 3;
+  int vain_leaps = 0;
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
   for (int i = 0; i < most_moves && !work_.spent(); ++i) {
@@ -266,6 +386,11 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
       looked_at = distance;
       if (!on) move.room = 0.0;
     }
+    if (on && vain_leaps < most_vain_leaps && !solution.planes.empty()) {
+      vain_leaps = leap(move, solution.proxy, solution.planes) ? 0 : vain_leaps + 1;
+      continue;
+    }
+    vain_leaps = 0;
     if (on && (make(move, solution.proxy, solution.planes) || move.room > least_room * tolerance_)) continue;
     // At rest, or no move comes nearer: by all that is known to hold it.
     solution.planes = move.around;

@@ -29,36 +29,79 @@ class ActiveSet {
   }
 
   PlaneProjection solve() noexcept {
-    const std::size_t n = planes_.size();
-    if (none()) return best_;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (violation_[i] > 0.0 && accept({{i, violation_[i]}})) return best_;
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < n; ++j) {
-        if (pair(i, j)) return best_;
-      }
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < n; ++j) {
-        for (std::size_t k = j + 1; k < n; ++k) {
-          if (triple(i, j, k)) return best_;
-        }
-      }
-    }
+    constexpr std::size_t few = 4;
+    if (planes_.size() > few && by_most_missed()) return best_;
+    among_.clear();
+    for (std::size_t i = 0; i < planes_.size(); ++i) among_.push_back(i);
+    try_all();
     return best_;
   }
 
  private:
   using Active = PlaneProjection::Active;
 
+  /// The same choice where there are many planes: from what holds so far to that and the plane that this misses most.
+  bool by_most_missed() noexcept {
+    // Each is farther from the goal than the one before.
+    const std::size_t most_rounds = 2 * planes_.size();
+    best_.point = goal_;
+    best_.active.clear();
+    Vec3 moved = Vec3::Zero();
+    for (std::size_t round = 0; round < most_rounds; ++round) {
+      std::size_t missed = 0;
+      double worst = -infinity;
+      for (std::size_t i = 0; i < planes_.size(); ++i) {
+        const double by = violation_[i] - planes_[i].normal.dot(moved);
+        if (by > worst) worst = by, missed = i;
+      }
+      if (worst <= (best_.active.empty() ? 0.0 : tolerance_)) {
+        best_.feasible = true;
+        return true;
+      }
+      among_.clear();
+      among_.push_back(missed);
+      for (const Active& one : best_.active) {
+        if (one.plane == missed) return false;
+        among_.push_back(one.plane);
+      }
+      std::sort(among_.begin(), among_.end());
+      try_all();
+      if (!best_.feasible) return false;
+      moved.setZero();
+      for (const Active& one : best_.active) moved += one.multiplier * planes_[one.plane].normal;
+    }
+    return false;
+  }
+
+  void try_all() noexcept {
+    const std::size_t n = among_.size();
+    if (none()) return;
+    for (const std::size_t i : among_) {
+      if (violation_[i] > 0.0 && accept({{i, violation_[i]}})) return;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        if (pair(among_[i], among_[j])) return;
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        for (std::size_t k = j + 1; k < n; ++k) {
+          if (triple(among_[i], among_[j], among_[k])) return;
+        }
+      }
+    }
+  }
+
   [[nodiscard]] double gram(std::size_t i, std::size_t j) const noexcept {
     return planes_[i].normal.dot(planes_[j].normal);
   }
 
   bool none() noexcept {
-    for (std::size_t i = 0; i < planes_.size(); ++i) least_worst_ = std::max(least_worst_, violation_[i]);
+    least_worst_ = 0.0;
+    for (const std::size_t i : among_) least_worst_ = std::max(least_worst_, violation_[i]);
     best_.point = goal_;
+    best_.active.clear();
     best_.feasible = least_worst_ <= 0.0;
     return best_.feasible;
   }
@@ -91,9 +134,7 @@ class ActiveSet {
     Vec3 moved = Vec3::Zero();
     for (const Active& one : active) moved += one.multiplier * planes_[one.plane].normal;
     double worst = 0.0;
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      worst = std::max(worst, violation_[i] - planes_[i].normal.dot(moved));
-    }
+    for (const std::size_t i : among_) worst = std::max(worst, violation_[i] - planes_[i].normal.dot(moved));
     const bool feasible = worst <= tolerance_;
     if (!feasible && worst >= least_worst_) return false;
     least_worst_ = worst;
@@ -108,6 +149,7 @@ class ActiveSet {
 
   const Vec3& goal_;
   const PlaneSet& planes_;
+  FixedVector<std::size_t, PlaneSet::capacity()> among_;  ///< planes that are to hold
   double violation_[PlaneSet::capacity()];
   double tolerance_ = 0.0;
   double least_worst_ = 0.0;

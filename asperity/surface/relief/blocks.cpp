@@ -16,12 +16,12 @@ void ReliefBlocks::keep_only(std::uint64_t relief, const CoatMoment& moment) noe
   relief_ = relief;
   moment_ = moment;
   ++generation_;
-  for (Answer& answer : answers_) answer.reach = 0.0;
+  for (Answer& answer : answers_) answer.asked.reach = 0.0;
 }
 
-const ReliefBlocks::Answer* ReliefBlocks::answer(const Vec3& p, double touching, double reach) const noexcept {
+const ReliefBlocks::Answer* ReliefBlocks::answer(const Vec3& p, const FeetAsked& asked) const noexcept {
   for (const Answer& answer : answers_) {
-    if (answer.reach == reach && answer.touching == touching && answer.p == p) return &answer;
+    if (answer.asked == asked && answer.p == p) return &answer;
   }
   return nullptr;
 }

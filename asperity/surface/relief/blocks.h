@@ -12,7 +12,7 @@
 #include "asperity/core/math.h"
 #include "asperity/core/work.h"
 #include "asperity/geometry/contact.h"
-#include "asperity/surface/relief/frame.h"
+#include "asperity/surface/relief/view.h"
 
 namespace asperity {
 
@@ -48,6 +48,17 @@ struct ReliefDisk {
     if (beside <= wide * wide) return true;
     const double most = wide + std::sqrt(reach * reach - beyond * beyond);
     return beside <= most * most;
+  }
+  /// How far p is from it at least, but for rounding (m). [servo]
+  [[nodiscard]] double away(const Vec3& p) const noexcept {
+    const Vec3 off = p - Vec3(middle[0], middle[1], middle[2]);
+    const double along = off.x() * static_cast<double>(normal[0]) + off.y() * static_cast<double>(normal[1]) +
+                         off.z() * static_cast<double>(normal[2]);
+    const double beyond = std::max(0.0, std::abs(along) - static_cast<double>(half));
+    const double beside =
+        std::max(0.0, std::sqrt(std::max(0.0, off.squaredNorm() - along * along)) - static_cast<double>(radius));
+    constexpr double rounding = 1e-5;
+    return (1.0 - rounding) * std::sqrt(beyond * beyond + beside * beside);
   }
 };
 
@@ -88,16 +99,15 @@ class ReliefBlocks {
   Block& block(const ReliefBlockName& name, bool& known) noexcept;
   /// Room for a face's frame: whether it is there already `ReliefSurface::holds` tells. [servo]
   ReliefFrame& frame(std::uint32_t face) noexcept { return frames_[face % frames_.size()]; }
-  /// What `ReliefView::feet` has answered of a place and a reach.
+  /// What `ReliefView::feet` has answered.
   struct Answer {
     Vec3 p = Vec3::Zero();
-    double touching = 0.0;
-    double reach = 0.0;  ///< 0: nothing was
+    FeetAsked asked;  ///< reach 0: nothing was
     ContactSet feet;
     WorkCount count;  ///< what it took
   };
   /// One of the last two, of exactly these; none: they were of others. [servo]
-  [[nodiscard]] const Answer* answer(const Vec3& p, double touching, double reach) const noexcept;
+  [[nodiscard]] const Answer* answer(const Vec3& p, const FeetAsked& asked) const noexcept;
   /// In place of the older one. [servo]
   void remember(const Answer& answer) noexcept;
   /// Its samples, or those that make room for them, `known` false. [servo]

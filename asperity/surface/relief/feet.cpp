@@ -23,11 +23,22 @@ struct Range {
   int to_v = 0;
 };
 
+/// Of a descent to a foot, before it is seen where it leads.
+constexpr int few_moves = 5;
+Goal goal_of_feet(const Vec3& p) noexcept {
+  // A ball may lie on a surface that is bent nearly as it is.
+  constexpr double flattest = 1e-4;
+  return {.point = p, .may_leave = false, .exactly = true, .moves = few_moves, .flattest = flattest};
+}
+
 class ReliefFeetSearch {
  public:
-  ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, double touching, double reach, const CoatMoment& moment,
+  ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, const FeetAsked& asked, const CoatMoment& moment,
                    ReliefBlocks* blocks, ContactSet& out) noexcept
-      : surface_(surface), p_(p), touching_(touching), reach_(reach), moment_(moment), blocks_(blocks), out_(out) {}
+      : surface_(surface), p_(p), asked_(asked), reach_(asked.reach), moment_(moment), blocks_(blocks), out_(out) {}
+
+  /// How far what is looked for may be (m): less once as many as that are known.
+  [[nodiscard]] double reach() const noexcept { return reach_; }
 
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
 
@@ -56,11 +67,8 @@ class ReliefFeetSearch {
 
  private:
   static constexpr int stride = BlockSamples::stride;
-  /// Of a descent, before it is seen where it leads, and in all.
-  static constexpr int few_moves = 5;
+  /// Of a descent in all.
   static constexpr int most_moves = 1024;
-  /// A ball may lie on a surface that is bent nearly as it is.
-  static constexpr double flattest = 1e-4;
   /// Of a step of the lattice: places nearer to each other are told once.
   static constexpr double same_place = 0.25;
   /// Squared, in twice the squared length of the longest of the lattice's steps.
@@ -79,38 +87,59 @@ class ReliefFeetSearch {
             to(middle.y() + reach.y())};
   }
 
-  /// A part of the lattice and those it is made of, as far as they may come within reach.
+  /// A part of the lattice and how far it is at least (m).
+  struct Part {
+    ReliefBlockName name;
+    double away = 0.0;
+  };
+
+  /// A part of the lattice and those it is made of, as far as they may come within reach; the nearest first.
   void search(const ReliefBlockName& whole, const ReliefFrame& frame, const Range& range) noexcept {
-    ReliefBlockName stack[3 * deepest_part + 4];
-    int top = 0;
-    stack[top++] = whole;
-    while (top > 0) {
-      const ReliefBlockName name = stack[--top];
-      const int side = BlockSamples::across << name.level;
-      const int u = name.i * side;
-      const int v = name.j * side;
-      const bool beyond_third_side = u + v > last_;
-      if (beyond_third_side || u >= range.to_u || u + side <= range.from_u || v >= range.to_v ||
-          v + side <= range.from_v)
-        continue;
-      bool known = false;
-      ReliefBlocks::Block& block = blocks_ != nullptr ? blocks_->block(name, known) : block_;
-      count_.bounds += bounds_of_block;
-      if (!known) {
-        block.name = name;
-        block.apart = 0.0F;
-        block.disk = disk_around(frame, u, v, side);
-      }
-      if (!within_reach(block)) continue;
+    FixedVector<Part, 3 * deepest_part + 4> parts;
+    add(whole, frame, range, parts);
+    while (!parts.empty()) {
+      const Part part = parts[parts.size() - 1];
+      parts.swap_remove(parts.size() - 1);
+      if (part.away > reach_) continue;
+      const ReliefBlockName& name = part.name;
       if (name.level == 0) {
-        look_at(frame, block);
+        look_at(frame, block_of(name, frame));
         continue;
       }
+      const std::size_t first = parts.size();
       for (int child = 0; child < 4; ++child) {
-        stack[top++] = {name.face, static_cast<std::uint16_t>(2 * name.i + (child & 1)),
-                        static_cast<std::uint16_t>(2 * name.j + (child >> 1)), name.level - 1};
+        add({name.face, static_cast<std::uint16_t>(2 * name.i + (child & 1)),
+             static_cast<std::uint16_t>(2 * name.j + (child >> 1)), name.level - 1},
+            frame, range, parts);
       }
+      std::sort(parts.begin() + static_cast<std::ptrdiff_t>(first), parts.end(),
+                [](const Part& a, const Part& b) { return a.away > b.away; });
     }
+  }
+
+  /// A part to look at, if it may come within reach.
+  void add(const ReliefBlockName& name, const ReliefFrame& frame, const Range& range,
+           FixedVector<Part, 3 * deepest_part + 4>& parts) noexcept {
+    const int side = BlockSamples::across << name.level;
+    const int u = name.i * side;
+    const int v = name.j * side;
+    const bool beyond_third_side = u + v > last_;
+    if (beyond_third_side || u >= range.to_u || u + side <= range.from_u || v >= range.to_v || v + side <= range.from_v)
+      return;
+    count_.bounds += bounds_of_block;
+    const ReliefBlocks::Block& block = block_of(name, frame);
+    if (within_reach(block)) parts.push_back({name, block.disk.away(p_)});
+  }
+
+  ReliefBlocks::Block& block_of(const ReliefBlockName& name, const ReliefFrame& frame) noexcept {
+    bool known = blocks_ == nullptr && block_.name == name;
+    ReliefBlocks::Block& block = blocks_ != nullptr ? blocks_->block(name, known) : block_;
+    if (known) return block;
+    block.name = name;
+    block.apart = 0.0F;
+    const int side = BlockSamples::across << name.level;
+    block.disk = disk_around(frame, name.i * side, name.j * side, side);
+    return block;
   }
 
   /// Around the relief over a part of the lattice and over what is right beside it.
@@ -188,7 +217,7 @@ class ReliefFeetSearch {
         }
       }
     }
-    const auto beside_touching = static_cast<float>(touching_ * touching_ + 2.0 * least_drop_);
+    const auto beside_touching = static_cast<float>(asked_.touching * asked_.touching + 2.0 * least_drop_);
     if (any(nearest <= beside_touching)) look_closely(frame, from_u, from_v, squares, beside_touching);
   }
 
@@ -213,7 +242,8 @@ class ReliefFeetSearch {
     each([&](int, int, int k) {
       crests[k] = squares[k] <= beside_touching ? crest_beside(&squares[k]).square : squares[k];
     });
-    const auto touching = static_cast<float>(touching_ * touching_);
+    const double nearer = std::min(asked_.touching, reach_);
+    const auto touching = static_cast<float>(nearer * nearer);
     each([&](int i, int j, int k) {
       if (crests[k] > touching || !first_of_like(&crests[k])) return;
       const Beside crest = crest_beside(&squares[k]);
@@ -386,7 +416,7 @@ class ReliefFeetSearch {
     ReliefPlace at = place;
     ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
     const Vec3 start = spot.point;
-    Goal goal{.point = p_, .may_leave = false, .exactly = true, .moves = few_moves, .flattest = flattest};
+    Goal goal = goal_of_feet(p_);
     if (descend(surface_, at, spot, 1.0, goal, count_) == DescentEnd::limited) {
       // What lies further off beyond an edge, samples of the other face lead to.
       if (at.frame.face != place.frame.face && (spot.point - start).squaredNorm() > far_off * least_drop_) return;
@@ -399,11 +429,23 @@ class ReliefFeetSearch {
     for (const Foot& other : out_) {
       if ((other.point - foot.point).norm() <= same) return;
     }
-    if (out_.push_back(foot)) return;
-    // Of more than there is room for, the nearest.
-    Foot* farthest = std::max_element(out_.begin(), out_.end(),
-                                      [](const Foot& a, const Foot& b) { return a.distance < b.distance; });
-    if (foot.distance < farthest->distance) *farthest = foot;
+    // Of more than are asked for, the nearest.
+    if (out_.size() < asked_.most) {
+      out_.push_back(foot);
+    } else {
+      Foot* const farthest = farthest_found();
+      if (foot.distance < farthest->distance) *farthest = foot;
+    }
+    if (out_.size() == asked_.most) reach_ = farthest_found()->distance;
+    if (asked_.of_overlap < 1.0 && foot.distance < asked_.touching) {
+      const double among =
+          std::max(asked_.of_overlap * (asked_.touching - foot.distance), asked_.reach - asked_.touching);
+      reach_ = std::min(reach_, foot.distance + among);
+    }
+  }
+  [[nodiscard]] Foot* farthest_found() noexcept {
+    return std::max_element(out_.begin(), out_.end(),
+                            [](const Foot& a, const Foot& b) { return a.distance < b.distance; });
   }
 
   /// What looks take where nothing is known yet: what is counted does not hang on what is.
@@ -412,7 +454,7 @@ class ReliefFeetSearch {
 
   const ReliefSurface& surface_;
   Vec3 p_;
-  double touching_;
+  FeetAsked asked_;
   double reach_;
   CoatMoment moment_;
   ReliefBlocks* blocks_;  ///< none: every look is the first
@@ -430,28 +472,46 @@ class ReliefFeetSearch {
 
 }  // namespace
 
-void ReliefView::feet(const Vec3& p, double touching, double reach, ContactSet& out) const noexcept {
+Foot ReliefView::follow(const Vec3& p, const Foot& foot) const noexcept {
+  ReliefPlace place;
+  if (ReliefBlocks* const blocks = cache_->blocks) {
+    blocks->keep_only(surface_->identity(), moment_);
+    ReliefFrame& frame = blocks->frame(foot.element);
+    if (!surface_->holds(frame, foot.element, moment_)) frame = surface_->frame(foot.element, moment_);
+    place = {frame, foot.at[1], foot.at[2]};
+  } else {
+    place = {surface_->frame(foot.element, moment_), foot.at[1], foot.at[2]};
+  }
+  ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
+  WorkCount count;
+  ++count.frames;
+  asperity::descend(*surface_, place, spot, 1.0, goal_of_feet(p), count);
+  tell(cache_->work, count);
+  return foot_at(place, spot, p);
+}
+
+void ReliefView::feet(const Vec3& p, const FeetAsked& asked, ContactSet& out) const noexcept {
   out.clear();
   ReliefBlocks* const blocks = cache_->blocks;
   if (blocks != nullptr) {
     blocks->keep_only(surface_->identity(), moment_);
     // A tick begins where the last one has ended.
-    if (const ReliefBlocks::Answer* known = blocks->answer(p, touching, reach)) {
+    if (const ReliefBlocks::Answer* known = blocks->answer(p, asked)) {
       out = known->feet;
       tell(cache_->work, known->count);
       return;
     }
   }
-  ReliefFeetSearch search(*surface_, p, touching, reach, moment_, blocks, out);
-  surface_->base().index().for_each_near(p, reach, surface_->boxes(), [&](std::uint32_t face) {
+  ReliefFeetSearch search(*surface_, p, asked, moment_, blocks, out);
+  surface_->base().index().for_each_near(p, asked.reach, surface_->boxes(), [&](std::uint32_t face) {
     search.visit(face);
-    return reach;
+    return search.reach();
   });
   tell(cache_->work, search.count());
   std::sort(out.begin(), out.end(), [](const Foot& a, const Foot& b) {
     return a.distance < b.distance || (a.distance == b.distance && a.element < b.element);
   });
-  if (blocks != nullptr) blocks->remember({p, touching, reach, out, search.count()});
+  if (blocks != nullptr) blocks->remember({p, asked, out, search.count()});
 }
 
 }  // namespace asperity

@@ -12,6 +12,19 @@ namespace asperity {
 DescentEnd descend(const ReliefSurface& surface, ReliefPlace& place, ReliefPoint& spot, double side, const Goal& goal,
                    WorkCount& count) noexcept;
 
+/// Which places a ball may rest on are looked for around its centre.
+struct FeetAsked {
+  /// Up to here (m) those on narrow crests as well, where the distance hardly changes from one to the next.
+  double touching = 0.0;
+  double reach = 0.0;  ///< m
+  /// Of more than these, the nearest.
+  std::size_t most = ContactSet::capacity();
+  /// Below 1: where something is nearer than `touching`, only what is farther than that by no more than this share of
+  /// how much, or than `reach` is beyond `touching`.
+  double of_overlap = 1.0;
+  friend bool operator==(const FeetAsked&, const FeetAsked&) = default;
+};
+
 /// A relief at one moment of its coat: see SurfaceView. [servo]
 class ReliefView {
  public:
@@ -31,10 +44,11 @@ class ReliefView {
                                 std::uint32_t likely = no_index) const noexcept;
   /// Of the displaced surface. `normal` is that of the surface, turned towards p.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
-  /// Every place of the surface within `reach` of p (m) that is nearer to it than those around, the nearest first; of
-  /// more than there is room for, the nearest. Up to `touching` (m) those on narrow crests as well, where the distance
-  /// hardly changes from one to the next. Normals as nearest's.
-  void feet(const Vec3& p, double touching, double reach, ContactSet& out) const noexcept;
+  /// Every place of the surface within reach of p that is nearer to it than those around, as far as asked for; the
+  /// nearest first. Normals as nearest's.
+  void feet(const Vec3& p, const FeetAsked& asked, ContactSet& out) const noexcept;
+  /// Where a place that feet has told is led to by a ball whose centre is now at p. It may come to that of another one.
+  [[nodiscard]] Foot follow(const Vec3& p, const Foot& foot) const noexcept;
   [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
     ReliefCache& cache = hold(place.element);
     const double u = place.at[1];
