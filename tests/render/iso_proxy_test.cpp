@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <random>
 #include <vector>
 
 #include "asperity/render/law_registry.h"
@@ -455,6 +458,96 @@ TEST(IsoProxy, ABallRestsOnBothWallsOfANarrowGroove) {
   EXPECT_NEAR(state.proxy.z(), rest, 1e-4);
   EXPECT_NEAR(state.proxy.x(), 0.0, 1e-4);
   EXPECT_GT(out.wrench.force.z(), 0.0);
+}
+
+/// Ground that is rough down to three cells, over a cube of +-10 mm: the surface is where z is 0 or so.
+std::shared_ptr<const ScalarField> rough_ground(CellReconstruction reconstruction) {
+  return std::make_shared<const ScalarField>(sampled(cube_axes(0.01, 61),
+                                                     [](const Vec3& p) {
+                                                       double height = 0.0;
+                                                       for (int k = 0; k < 12; ++k) {
+                                                         const double wave = 1.1e-3 * std::pow(1.3, k % 6);
+                                                         const double turn = 2.4 * k;
+                                                         const double along =
+                                                             std::cos(turn) * p.x() + std::sin(turn) * p.y();
+                                                         height += 0.09 * wave * std::sin(6.28 * along / wave + k);
+                                                       }
+                                                       return p.z() - height;
+                                                     }),
+                                             reconstruction);
+}
+
+/// Places of that ground: the field's roots up columns 50 um apart over +-5 mm, found without its surface queries.
+std::vector<Vec3> places_of(const ScalarField& field) {
+  std::vector<Vec3> places;
+  const auto value = [&](const Vec3& p) {
+    CellPolynomial cell;
+    return field.load(0, field.cell_of(0, p), cell) ? cell.value(p) : 0.0;
+  };
+  for (double x = -5e-3; x < 5e-3; x += 5e-5) {
+    for (double y = -5e-3; y < 5e-3; y += 5e-5) {
+      double low = -4e-3;
+      double high = 4e-3;
+      for (int i = 0; i < 30; ++i) {
+        const double middle = 0.5 * (low + high);
+        (value(Vec3(x, y, middle)) < 0.0 ? low : high) = middle;
+      }
+      places.emplace_back(x, y, low);
+    }
+  }
+  return places;
+}
+
+TEST_P(IsoProxyEach, ABallComesToRestAmongAllThatItTouches) {
+  const auto field = rough_ground(GetParam());
+  const std::vector<Vec3> places = places_of(*field);
+  const auto nearest = [&](const Vec3& p) {
+    double square = infinity;
+    for (const Vec3& place : places) square = std::min(square, (place - p).squaredNorm());
+    return std::sqrt(square);
+  };
+  std::mt19937_64 generator(91);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  const auto any = [&] { return Vec3(within(generator), within(generator), within(generator)); };
+  int held_by_several = 0;
+  int unfinished_ticks = 0;
+  const Instance ground = iso_instance(field, 0.0, Inside::low, Sides::front);
+  SurfaceCache cache;
+  const IsoView view = iso_of(ground.surface)->view(cache);
+  for (const double radius : {3e-4, 2e-3}) {
+    const Scene scene = scene_of(ground, radius);
+    ProxyState state;
+    Vec3 place(0.0, 0.0, 3e-3 + radius);
+    Vec3 heading(0.0, 0.0, -1e-4);
+    for (int i = 0; i < 500; ++i) {
+      if (i % 50 == 49) heading = 6e-5 * any();
+      place += heading;
+      if (place.head<2>().cwiseAbs().maxCoeff() > 2e-3) heading.head<2>() *= -1.0;
+      if ((place.z() < radius - 1e-3 && heading.z() < 0.0) || (place.z() > radius + 1e-3 && heading.z() > 0.0))
+        heading.z() *= -1.0;
+      const ForceSample felt = touch(scene, state, place);
+      unfinished_ticks += unfinished(felt.flags) ? 1 : 0;
+      held_by_several += felt.contact.places.size() > 1 ? 1 : 0;
+      // No place of the surface lies within the ball.
+      ASSERT_GT(nearest(state.proxy), radius - 1e-9) << "radius " << radius << ", tick " << i;
+      if (!felt.flags.has(TickFlag::contact)) continue;
+      const double kept = view.nearest(state.proxy, infinity).distance;
+      // What is left to go is not worth a move.
+      ASSERT_NEAR(kept, radius, 2e-4 * view.grain() + 10.0 * view.skin()) << "tick " << i;
+      // Nowhere around is there room nearer to the probe.
+      const double here = (state.proxy - place).norm();
+      for (int k = 0; k < 24; ++k) {
+        const double length = 1e-5 * std::pow(10.0, within(generator));
+        const Vec3 there = state.proxy + length * any().normalized();
+        if (here - (there - place).norm() < 0.02 * length) continue;
+        ASSERT_LT(view.nearest(there, infinity).distance, kept + 0.01 * length)
+            << "radius " << radius << ", tick " << i << ", " << length << " m off";
+      }
+    }
+  }
+  ASSERT_GT(held_by_several, 200);
+  // The surface of a trilinear field is creased from cell to cell.
+  ASSERT_LE(unfinished_ticks, GetParam() == CellReconstruction::trilinear ? 10 : 0);
 }
 
 TEST(IsoProxy, NothingIsFeltBeyondTheBorderOrInHoles) {

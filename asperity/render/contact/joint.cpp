@@ -60,10 +60,6 @@ bool JointSolve::complete() const noexcept {
   return all;
 }
 
-bool JointSolve::tells_all_feet(const Entry& entry) const noexcept {
-  return radius_ > 0.0 && entry.smooth && std::holds_alternative<ReliefView>(entry.touch->view);
-}
-
 bool JointSolve::rolls(const ConstraintPlane& plane) const noexcept {
   return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
 }
@@ -96,7 +92,8 @@ bool JointSolve::plane_off(std::size_t index, const Vec3& local, const Foot& foo
   return true;
 }
 
-/// Of a relief, planes that keep the ball off all that it touches or would on the next step from here.
+/// Planes that keep the ball off all that it touches or would on the next step from here: of a relief what there is, of
+/// others the nearest place and what is known already.
 const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position) noexcept {
   const double beyond = std::clamp(stride_, 0.006 * radius_, 0.25 * radius_);
   if (last_feet_.index == index && last_feet_.position == position && last_feet_.beyond == beyond)
@@ -109,10 +106,17 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
   const Vec3 local = entry.touch->to_local(position);
   ContactSet feet;
   const double touching = radius_ + gap(entry) + 2.0 * entry.skin;
-  std::get_if<ReliefView>(&entry.touch->view)
-      ->feet(local, {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
-             feet);
-  keep_following(index, position, touching + beyond, feet);
+  const auto* relief = std::get_if<ReliefView>(&entry.touch->view);
+  if (relief != nullptr) {
+    relief->feet(local,
+                 {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
+                 feet);
+  } else {
+    const Foot foot = on_smooth_view(
+        entry.touch->view, [&](const auto& view) { return view.nearest(local, touching + beyond, entry.near); });
+    if (foot.found()) feet.push_back(foot);
+  }
+  keep_following(index, position, relief != nullptr ? touching + beyond : 0.0, feet);
   for (std::size_t i = 0; i < feet.size(); ++i) {
     Place place;
     ConstraintPlane plane;
@@ -169,7 +173,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
-    if (tells_all_feet(entry)) {
+    if (leads_ball(entry)) {
       if (following_) {
         followed_planes(i, position, out);
       } else {
@@ -269,11 +273,11 @@ bool JointSolve::push_out(Vec3& position) noexcept {
     bool clear = true;
     // Of those that tell all, what is there now.
     for (std::size_t k = held.size(); k-- > 0;) {
-      if (tells_all_feet(entries_[held[k].owner])) held.swap_remove(k);
+      if (leads_ball(entries_[held[k].owner])) held.swap_remove(k);
     }
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       if (!entries_[i].smooth) continue;
-      if (tells_all_feet(entries_[i])) {
+      if (leads_ball(entries_[i])) {
         for (const ConstraintPlane& foot : feet_planes(i, position)) {
           if (!held.push_back(foot)) return false;
           if (foot.offset + foot.skin - foot.normal.dot(position) <= 0.25 * entries_[i].skin) continue;
@@ -463,7 +467,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
       if (!solution.settled() && solution.projection.active.empty()) share_out(goal, solution);
       return solution;
     }
-    if (radius_ > 0.0 && all_tell_feet()) {
+    if (radius_ > 0.0 && !facets_) {
       settle_ball(goal, solution);
     } else {
       settle_among_smooth(goal, solution);

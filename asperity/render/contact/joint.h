@@ -136,12 +136,13 @@ class JointSolve {
   void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
 
-  /// Whether all places that a ball may rest on are asked for at once.
-  [[nodiscard]] bool tells_all_feet(const Entry& entry) const noexcept;
+  /// Whether a ball is led along all that it may rest on there, followed from one look to the next.
+  [[nodiscard]] bool leads_ball(const Entry& entry) const noexcept { return radius_ > 0.0 && !facets_ && entry.smooth; }
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   [[nodiscard]] bool plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
                                ConstraintPlane& plane) const noexcept;
   [[nodiscard]] const PlaneSet& feet_planes(std::size_t index, const Vec3& position) noexcept;
+  [[nodiscard]] static Foot led_to(const Entry& entry, const Vec3& local, const Foot& foot) noexcept;
   void keep_following(std::size_t index, const Vec3& position, double within, ContactSet& feet) noexcept;
   [[nodiscard]] bool same_place(std::size_t index, const Foot& a, const Foot& b) const noexcept;
   void follow(const Followed& one) noexcept;
@@ -157,7 +158,6 @@ class JointSolve {
   void settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept;
   using CutSet = FixedVector<ConstraintPlane, 8>;
   struct BallMove;
-  [[nodiscard]] bool all_tell_feet() const noexcept;
   [[nodiscard]] Mat3 bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] Vec3 bent_step(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy, const Vec3& goal,
                                double stiffest, double& gain) const noexcept;

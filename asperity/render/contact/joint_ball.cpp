@@ -50,11 +50,6 @@ Mat3 bend_at_distance(const Mat3& bend, double distance) noexcept {
 
 }  // namespace
 
-bool JointSolve::all_tell_feet() const noexcept {
-  return std::all_of(entries_.begin(), entries_.end(),
-                     [&](const Entry& entry) { return !entry.smooth || tells_all_feet(entry); });
-}
-
 /// The second derivative of the distance from what a plane is of, where the ball's centre is.
 Mat3 JointSolve::bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept {
   constexpr double as_surface = 1.0 - 1e-6;
@@ -64,16 +59,25 @@ Mat3 JointSolve::bend_of(const ConstraintPlane& plane, const Vec3& position) con
   const Mat3 round = (Mat3::Identity() - plane.normal * plane.normal.transpose()) / distance;
   const auto around = [&](const Vec3& edge) { return Mat3(round - edge * edge.transpose() / distance); };
   if (!entry.smooth) return rolls(plane) ? around(edge_of(plane)) : Mat3(Mat3::Zero());
-  const ReliefView& view = *std::get_if<ReliefView>(&touch.view);
-  const Place place{plane.contact.element, false, plane.contact.at};
-  const ReliefPoint& spot = view.at(place);
-  const double aligned = plane.normal.dot(touch.turned(spot.front));
+  const Vec3 front =
+      touch.turned(on_smooth_view(touch.view, [&](const auto& view) { return Vec3(view.front(plane.contact)); }));
+  const double aligned = plane.normal.dot(front);
   if (std::abs(aligned) < as_surface) {
     // On a fold, which goes across both; at its corners it is round.
-    const bool corner = plane.contact.at.maxCoeff() >= 1.0;
-    return corner ? round : around(plane.normal.cross(touch.turned(spot.front)).normalized());
+    const bool corner = plane.contact.at.maxCoeff() >= 1.0 || !std::holds_alternative<ReliefView>(touch.view);
+    return corner ? round : around(plane.normal.cross(front).normalized());
   }
-  const Mat3 local = bend_at_distance(std::copysign(1.0, aligned) * view.bend(place, spot), distance);
+  const Place place{plane.contact.element, false, plane.contact.at};
+  const Mat3 bend = on_smooth_view(touch.view, [&](const auto& view) -> Mat3 {
+    if constexpr (requires { view.bend(place, view.at(place, plane.contact.normal)); }) {
+      return view.bend(place, view.at(place, plane.contact.normal));
+    } else if constexpr (requires { view.bend_at(plane.contact.point); }) {
+      return view.bend_at(plane.contact.point);
+    } else {
+      return Mat3::Zero();
+    }
+  });
+  const Mat3 local = bend_at_distance(std::copysign(1.0, aligned) * bend, distance);
   if (touch.at_origin) return local;
   const Mat3 turn = touch.pose->orientation.toRotationMatrix();
   return turn * local * turn.transpose();
@@ -104,6 +108,21 @@ Vec3 JointSolve::bent_step(const PlaneSet& planes, const PlaneProjection& flat, 
   return step;
 }
 
+/// Where a place that is followed is led to by a ball whose centre is now `local`.
+Foot JointSolve::led_to(const Entry& entry, const Vec3& local, const Foot& foot) noexcept {
+  if (const auto* relief = std::get_if<ReliefView>(&entry.touch->view)) return relief->follow(local, foot);
+  return on_smooth_view(entry.touch->view, [&](const auto& view) {
+    const Vec3 front = view.front(foot);
+    const double side = front.dot(local - foot.point) < 0.0 ? -1.0 : 1.0;
+    Place place{foot.element, side < 0.0, foot.at};
+    auto spot = view.at(place, front);
+    view.descend(place, spot, {.point = local, .may_leave = false});
+    Foot led{spot.point, Vec3::Zero(), (local - spot.point).norm(), place.element, place.at};
+    led.normal = side * view.front(led);
+    return led;
+  });
+}
+
 /// After a look that has found `feet` nearer than `within` to a ball at `position`: adds what was followed there and
 /// not found, and follows them all. What is further off stays followed.
 void JointSolve::keep_following(std::size_t index, const Vec3& position, double within, ContactSet& feet) noexcept {
@@ -115,9 +134,10 @@ void JointSolve::keep_following(std::size_t index, const Vec3& position, double 
     const Followed& one = followed_[i];
     if (one.index != index) continue;
     const double distance = (one.foot.point - local).norm();
-    if (one.stays ? distance <= farthest : distance > within && distance <= farthest) continue;
-    if (!one.stays && distance <= near) {
-      const Foot foot = std::get_if<ReliefView>(&entry.touch->view)->follow(local, one.foot);
+    const bool is_near = !one.stays && distance <= near;
+    if (!is_near && distance <= farthest && (one.stays || distance > within)) continue;
+    if (is_near) {
+      const Foot foot = led_to(entry, local, one.foot);
       const bool found =
           std::any_of(feet.begin(), feet.end(), [&](const Foot& other) { return same_place(index, foot, other); });
       if (!found) feet.push_back(foot);
@@ -159,7 +179,7 @@ void JointSolve::followed_planes(std::size_t index, const Vec3& position, PlaneS
     const double beside = off.cross(one.foot.normal).squaredNorm() / distance;
     if (distance > touching + 0.25 * radius_) continue;
     if (!one.stays && position != one.position && distance - 2.0 * beside <= touching + as_near * radius_) {
-      one.foot = std::get_if<ReliefView>(&entry.touch->view)->follow(local, one.foot);
+      one.foot = led_to(entry, local, one.foot);
       one.position = position;
     } else {
       one.foot.distance = distance;
@@ -345,11 +365,11 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
     if (!make(inner, place, there) && inner.room <= 0.01 * tolerance_) break;
   }
   following_ = false;
-  if (place == proxy) return false;
   const auto nearer = [&](const Vec3& next) {
     return 0.5 * ((proxy - move.goal).squaredNorm() - (next - move.goal).squaredNorm());
   };
   const double hoped = nearer(place);
+  if (!(hoped > 0.0)) return false;
   CutSet met;
   stride_ = rests ? 0.0 : farthest_foreseen * radius_;
   if (restore(place, there, met) && nearer(place) >= least_share * hoped) {
@@ -358,10 +378,10 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
     return true;
   }
   for (const ConstraintPlane& plane : met) {
-    if (tells_all_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy, true});
+    if (leads_ball(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy, true});
   }
   for (const ConstraintPlane& plane : planes) {
-    if (tells_all_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy});
+    if (leads_ball(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy});
   }
   return false;
 }

@@ -340,6 +340,17 @@ Vec3 IsoView::outward(const Vec3& p) const noexcept {
   return length > 0.0 ? Vec3((sigma / length) * jet.gradient) : Vec3::Zero();
 }
 
+Mat3 IsoView::bend_at(const Vec3& point) const noexcept {
+  const CellPolynomial* cell = over(point);
+  if (cell == nullptr) return Mat3::Zero();
+  const FieldJet jet = cell->jet(point);
+  const double length = jet.gradient.norm();
+  if (!(length > 0.0)) return Mat3::Zero();
+  const Vec3 normal = jet.gradient / length;
+  const Mat3 along = Mat3::Identity() - normal * normal.transpose();
+  return (sigma / length) * (along * jet.hessian * along);
+}
+
 bool IsoView::launch(const Place& place, const IsoSpot& spot, Vec3& from) const noexcept {
   // At the rim it starts within the volume: what comes in from outside has no side.
   const Box bounds = field->bounds();

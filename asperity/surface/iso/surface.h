@@ -86,6 +86,8 @@ struct IsoView {
   /// The gradient of phi at p, which is on or near the surface, unit; zero where there is none.
   [[nodiscard]] Vec3 outward(const Vec3& p) const noexcept;
   [[nodiscard]] Vec3 front(const Foot& foot) const noexcept { return outward(foot.point); }
+  /// How the front normal changes along the surface at a place (1/m): symmetric, 0 along the normal.
+  [[nodiscard]] Mat3 bend_at(const Vec3& point) const noexcept;
   /// phi / |grad phi|: a distance to first order near the surface; its gradient is unit.
   [[nodiscard]] FieldSample eval(const Vec3& p) const noexcept;
   /// Distance that keeps a resting probe off the surface (m).
