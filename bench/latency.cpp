@@ -185,6 +185,11 @@ int run_real(const Options& options) {
     fmt::print(stderr, "latency: {}\n", rows.error().message());
     return 2;
   }
+  if (rows->empty() && !options.real.only.empty()) {
+    fmt::print(stderr,
+               "latency: --rows leaves none; accepted: part of a \"body, stroke, law\" that a run without it prints\n");
+    return 2;
+  }
   fmt::print("{}", real_text(*rows));
   return 0;
 }
