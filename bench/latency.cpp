@@ -242,7 +242,8 @@ int main(int argc, char** argv) {
         "--long", [&] { options.real.ticks = 1000000; }, "real, ball: a million ticks a row");
     app.add_option("--budget", options.real.budget, "real, ball: of a tick, in evaluations; 0: no limit");
     app.add_flag("--every", options.real.every, "real, ball: every pair of strokes and laws");
-    app.add_option("--radii", options.radii, "ball: of the probe (mm)")->check(CLI::Range(0.0, 100.0));
+    const CLI::Option* const radii =
+        app.add_option("--radii", options.radii, "ball: of the probe (mm)")->check(CLI::Range(0.0, 100.0));
     app.add_option("--updates", options.updates, "Warm updates a row")
         ->check(CLI::Range(100, 100000000))
         ->capture_default_str();
@@ -260,6 +261,10 @@ int main(int argc, char** argv) {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& problem) {
       return app.exit(problem) == 0 ? 0 : 2;
+    }
+    if (radii->count() > 0 && options.only != "ball") {
+      fmt::print(stderr, "latency: --radii is of --only ball alone\n");
+      return 2;
     }
     if (options.only == "ball") {
       for (const double radius : options.radii) options.real.radii.push_back(1e-3 * radius);

@@ -479,32 +479,41 @@ Result<std::vector<RealRow>> measure_real(const RealEffort& effort, double clock
 
 namespace {
 
+/// Rows that keep what is owed.
+struct Kept {
+  std::size_t rows = 0;
+  std::size_t p999 = 0;   ///< of them, by this
+  std::size_t worst = 0;  ///< and by their slowest tick
+  double dearest_p999 = 0.0;
+  double dearest = 0.0;
+  std::size_t not_converged = 0;  ///< ticks
+
+  void add(const RealRow& row, double most_p999, double most) {
+    ++rows;
+    p999 += row.times.p999 <= most_p999 ? 1U : 0U;
+    worst += row.worst_again <= most ? 1U : 0U;
+    dearest_p999 = std::max(dearest_p999, row.times.p999);
+    dearest = std::max(dearest, row.worst_again);
+    not_converged += row.not_converged;
+  }
+};
+
 /// How many rows keep what is owed: p99.9 and the slowest tick (us), of strokes at 5 m/s more.
 std::string sum_up(const std::string& of, const std::vector<RealRow>& rows) {
-  std::size_t count = 0;
-  std::size_t not_converged = 0;
+  Kept kept;
   std::size_t open = 0;
   std::uint32_t longest = 0;
-  std::size_t in_time = 0;
-  std::size_t in_time_at_worst = 0;
-  double slowest = 0.0;
-  double slowest_of_all = 0.0;
   for (const RealRow& row : rows) {
-    if (row.body.substr(0, of.size()) != of || row.body.find(bare_body) != std::string::npos) continue;
+    if (!row.body.starts_with(of) || row.body.find(bare_body) != std::string::npos) continue;
     const bool fast = row.stroke == "sweep 5 m/s";
-    ++count;
-    not_converged += row.not_converged;
+    kept.add(row, fast ? 50e3 : 20e3, fast ? 200e3 : 100e3);
     open += row.open;
     longest = std::max(longest, row.longest_open);
-    in_time += row.times.p999 <= (fast ? 50e3 : 20e3) ? 1U : 0U;
-    in_time_at_worst += row.worst_again <= (fast ? 200e3 : 100e3) ? 1U : 0U;
-    slowest = std::max(slowest, row.times.p999);
-    slowest_of_all = std::max(slowest_of_all, row.worst_again);
   }
-  if (count == 0) return {};
+  if (kept.rows == 0) return {};
   return fmt::format("{:<16} {:>5} {:>12} {:>14.1f} {:>13} {:>14.1f} {:>8} {:>8} {:>8}\n", of.empty() ? "all" : of,
-                     count, in_time, 1e-3 * slowest, in_time_at_worst, 1e-3 * slowest_of_all, not_converged, open,
-                     longest);
+                     kept.rows, kept.p999, 1e-3 * kept.dearest_p999, kept.worst, 1e-3 * kept.dearest,
+                     kept.not_converged, open, longest);
 }
 
 constexpr const char* bodies_of_sums[] = {"bunny-28k", "spot",   "FlightHelmet",     "vase",
@@ -513,10 +522,10 @@ constexpr const char* bodies_of_sums[] = {"bunny-28k", "spot",   "FlightHelmet",
 /// Of balls of each radius on each kind of body: how often a tick is late, and the median beside that of the same row
 /// by a point.
 std::string beside_points(const std::vector<RealRow>& rows) {
-  constexpr double late_p999 = 50e3;  // ns
-  constexpr double late_worst = 200e3;
+  constexpr double most_p999 = 50e3;  // ns
+  constexpr double most = 200e3;
   std::string text = fmt::format("Rows in time: p99.9 at most {:g} us, the slowest tick {:g} us.\n{:<16} {:>9} {:>5} ",
-                                 1e-3 * late_p999, 1e-3 * late_worst, "body", "radius mm", "rows");
+                                 1e-3 * most_p999, 1e-3 * most, "body", "radius mm", "rows");
   text += fmt::format("{:>12} {:>12} {:>12} {:>14} {:>13} {:>14} {:>8} {:>8}\n", "median p50", "dearest p50",
                       "median/point", "dearest p99.9", "p99.9 kept", "dearest tick", "kept", "not c.");
   std::vector<double> radii;
@@ -525,33 +534,25 @@ std::string beside_points(const std::vector<RealRow>& rows) {
   }
   for (const std::string of : bodies_of_sums) {
     for (const double radius : radii) {
+      Kept kept;
       std::vector<double> p50;
       std::vector<double> ratio;
-      std::size_t in_time = 0;
-      std::size_t in_time_at_worst = 0;
-      std::size_t not_converged = 0;
-      double p999 = 0.0;
-      double worst = 0.0;
       for (const RealRow& row : rows) {
         if (row.radius != radius || !row.body.starts_with(of)) continue;
         const auto point = std::find_if(rows.begin(), rows.end(), [&](const RealRow& one) {
           return one.radius == 0.0 && one.body == row.body && one.stroke == row.stroke && one.law == row.law;
         });
+        kept.add(row, most_p999, most);
         p50.push_back(row.times.p50);
         if (point != rows.end()) ratio.push_back(row.times.p50 / std::max(1.0, point->times.p50));
-        in_time += row.times.p999 <= late_p999 ? 1U : 0U;
-        in_time_at_worst += row.worst_again <= late_worst ? 1U : 0U;
-        not_converged += row.not_converged;
-        p999 = std::max(p999, row.times.p999);
-        worst = std::max(worst, row.worst_again);
       }
-      if (p50.empty()) continue;
+      if (kept.rows == 0) continue;
       std::sort(p50.begin(), p50.end());
       std::sort(ratio.begin(), ratio.end());
-      const auto median = [](const std::vector<double>& all) { return all.empty() ? 0.0 : all[all.size() / 2]; };
-      text += fmt::format("{:<16} {:>9g} {:>5} {:>12.2f} {:>12.2f} {:>12.2f} {:>14.1f} {:>13} {:>14.1f} {:>8} {:>8}\n",
-                          of.empty() ? "all" : of, 1e3 * radius, p50.size(), 1e-3 * median(p50), 1e-3 * p50.back(),
-                          median(ratio), 1e-3 * p999, in_time, 1e-3 * worst, in_time_at_worst, not_converged);
+      text += fmt::format("{:<16} {:>9g} {:>5} {:>12.2f} {:>12.2f} {:>12} {:>14.1f} {:>13} {:>14.1f} {:>8} {:>8}\n",
+                          of.empty() ? "all" : of, 1e3 * radius, kept.rows, 1e-3 * p50[p50.size() / 2],
+                          1e-3 * p50.back(), ratio.empty() ? "-" : fmt::format("{:.2f}", ratio[ratio.size() / 2]),
+                          1e-3 * kept.dearest_p999, kept.p999, 1e-3 * kept.dearest, kept.worst, kept.not_converged);
     }
   }
   return text;

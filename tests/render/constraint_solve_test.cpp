@@ -59,7 +59,7 @@ void expect_optimal(const Vec3& goal, const PlaneSet& planes, const PlaneProject
 
 RC_GTEST_PROP(ProjectOntoPlanes, answers_the_optimum_of_random_sets, (std::uint64_t seed)) {
   Rng rng(seed);
-  const PlaneSet planes = random_feasible_planes(rng, 8);
+  const PlaneSet planes = random_feasible_planes(rng, static_cast<std::uint32_t>(PlaneSet::capacity()));
   const Vec3 goal = random_point(rng, 2.0);
   const PlaneProjection answer = project_onto_planes(goal, planes, false);
   RC_ASSERT(answer.feasible);

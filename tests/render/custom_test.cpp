@@ -59,6 +59,56 @@ TEST(CustomSurfaceProxy, PushesAsTheFormulaSays) {
   }
 }
 
+TEST(CustomSurfaceProxy, ABallLiesInACornerAgainstBothWalls) {
+  for (const double radius : {1e-3, 8e-3}) {
+    const Scene scene = must(Scene::build({instance_of(surface_of(Corner{}))}, radius));
+    ProxyState state;
+    touch(scene, state, Vec3(0.02, 0.0, 0.02));
+    for (int i = 0; i <= 40; ++i) {
+      const double into = 5e-4 * i;
+      const Vec3 place(std::max(0.02 - into, radius - 1e-3), 1e-4 * i, std::max(0.02 - 0.9 * into, radius - 2e-3));
+      const ForceSample felt = touch(scene, state, place);
+      const Vec3 rest(std::max(place.x(), radius), place.y(), std::max(place.z(), radius));
+      ASSERT_FALSE(unfinished(felt.flags)) << radius << " " << i;
+      ASSERT_LT((state.proxy - rest).norm(), 1e-5) << radius << " " << i;
+      ASSERT_LT((felt.wrench.force - stiffness * (rest - place)).norm(), 1e-5 * stiffness) << radius << " " << i;
+    }
+  }
+}
+
+TEST(CustomSurfaceProxy, ABallComesToRestInTheRoomsOfAGyroid) {
+  const Instance sheet = instance_of(surface_of(GyroidSheet{}), Sides::both);
+  const CustomView view = custom_of(sheet.surface)->view();
+  Rng rng(92);
+  int unfinished_ticks = 0;
+  int touching = 0;
+  for (const double radius : {5e-4, 3e-3}) {
+    const Scene scene = must(Scene::build({sheet}, radius));
+    ProxyState state;
+    // In the middle of one of its rooms; from there it is led against the walls.
+    Vec3 place(0.0, 0.0, 0.0);
+    for (int i = 0; i < 40 && view.nearest(place, infinity).distance < 1.2 * radius; ++i)
+      place = 5e-3 * random_direction(rng);
+    const Vec3 middle = place;
+    touch(scene, state, place);
+    Vec3 heading = Vec3::Zero();
+    for (int i = 0; i < 400; ++i) {
+      if (i % 40 == 0) heading = 1e-4 * random_direction(rng);
+      if ((place - middle).norm() > 4e-3) heading = -1e-4 * (place - middle).normalized();
+      place += heading;
+      const ForceSample felt = touch(scene, state, place);
+      unfinished_ticks += unfinished(felt.flags) ? 1 : 0;
+      const double kept = view.nearest(state.proxy, infinity).distance;
+      ASSERT_GT(kept, radius * (1.0 - 1e-4)) << radius << " " << i;
+      if (!felt.flags.has(TickFlag::contact)) continue;
+      ++touching;
+      ASSERT_LT(kept, radius + 1e-3 * view.grain()) << radius << " " << i;
+    }
+  }
+  EXPECT_GT(touching, 200);
+  EXPECT_EQ(unfinished_ticks, 0);
+}
+
 TEST(CustomSurfaceProxy, SlidesLikeTheParametricSphere) {
   for (const double friction : {0.0, 0.3}) {
     const Scene own = must(Scene::build({instance_of(surface_of(Ball{}), Sides::front, friction)}, 0.0));

@@ -528,6 +528,7 @@ TEST_P(IsoProxyEach, ABallComesToRestAmongAllThatItTouches) {
       const ForceSample felt = touch(scene, state, place);
       unfinished_ticks += unfinished(felt.flags) ? 1 : 0;
       held_by_several += felt.contact.places.size() > 1 ? 1 : 0;
+      for (const Place& at : felt.contact.places) ASSERT_EQ(at.element, view.element_at(at.at)) << "tick " << i;
       // No place of the surface lies within the ball.
       ASSERT_GT(nearest(state.proxy), radius - 1e-9) << "radius " << radius << ", tick " << i;
       if (!felt.flags.has(TickFlag::contact)) continue;

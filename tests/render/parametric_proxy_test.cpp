@@ -390,6 +390,39 @@ TEST(ParametricProxy, ABallRestsAtItsRadiusAndIsNotPassed) {
   }
 }
 
+TEST(ParametricProxy, ABallLiesOnBothCrestsBesideAGroove) {
+  ParametricSettings waves = of_shape(ParametricShape::plane);
+  constexpr double wave = 1e-3;
+  constexpr double height = 1e-4;
+  waves.features = {grating(height, wave, 0.0)};
+  const Instance ground = instance_of(waves, Sides::front);
+  const ParametricSurface& surface = *parametric_of(ground.surface);
+  // Its profile across the waves, finely: what a ball is off it, and where it lies between two crests.
+  std::vector<Vec2> profile;
+  for (double u = 0.4; u < 0.6; u += 1e-6 / surface.settings().width) {
+    const Vec3 point = surface.jet(Vec2(u * surface.settings().width, 0.5 * surface.settings().depth)).point;
+    profile.emplace_back(point.x(), point.z());
+  }
+  int held_by_several = 0;
+  for (const double radius : {4e-4, 3e-3}) {
+    const Scene scene = scene_of(ground, radius);
+    ProxyState state;
+    touch(scene, state, Vec3(0.0, 0.0, radius + 1e-3));
+    for (int i = 0; i < 400; ++i) {
+      const ForceSample felt = touch(scene, state, Vec3(5e-6 * i, 0.0, radius - 5e-4));
+      ASSERT_FALSE(unfinished(felt.flags)) << radius << " " << i;
+      ASSERT_TRUE(felt.flags.has(TickFlag::contact));
+      double nearest = infinity;
+      for (const Vec2& at : profile) nearest = std::min(nearest, (at - Vec2(state.proxy.x(), state.proxy.z())).norm());
+      ASSERT_GT(nearest, radius - 1e-9) << radius << " " << i;
+      ASSERT_LT(nearest, radius + 1e-8 + 10.0 * surface.skin() + 2e-4 * surface.grain()) << radius << " " << i;
+      held_by_several += felt.contact.places.size() > 1 ? 1 : 0;
+      ASSERT_LT((felt.proxy - Vec3(5e-6 * i, 0.0, radius)).norm(), wave) << radius << " " << i;
+    }
+  }
+  EXPECT_GT(held_by_several, 200);
+}
+
 TEST(ParametricProxy, LawsWithoutAParametricFormAreRefused) {
   for (const Law& law : {Law(GodObjectLaw{}), Law(ForceShadingLaw{}), Law(MesostructureLaw{}), Law(AvilaLaw{}),
                          Law(MagneticLaw{}), Law(DenseMeshLaw{})}) {

@@ -294,6 +294,50 @@ TEST(ReliefSearch, of_a_ball_that_lies_along_a_narrow_crest_no_place_is_missed) 
   ASSERT_GT(several, 30);
 }
 
+TEST(ReliefSearch, of_what_a_ball_overlaps_the_deepest_places_are_told) {
+  Rng rng(84);
+  int cut = 0;
+  int fewer = 0;
+  int missed = 0;
+  int expected = 0;
+  for (const Searched& one : reliefs()) {
+    SurfaceCache cache;
+    const ReliefView view = one.surface->view(cache);
+    for (int i = 0; i < 150; ++i) {
+      const double reach = std::pow(10.0, rng.uniform(-3.3, -2.2));
+      const Vec3 p = random_near(rng, one.dense.index.mesh(), 1.2 * reach);
+      ContactSet all;
+      ContactSet told;
+      view.feet(p, {reach, 1.006 * reach}, all);
+      view.feet(p, {reach, 1.006 * reach, 3, 0.5}, told);
+      ASSERT_EQ(told.empty(), all.empty()) << one.name << ", case " << i;
+      if (all.empty()) continue;
+      ASSERT_LE(told.size(), 3U);
+      ASSERT_LE(told[0].distance - all[0].distance, 1e-6 * reach) << one.name << ", case " << i;
+      // Of the others, what is asked for is among them.
+      const double overlap = std::max(0.0, reach - all[0].distance);
+      const double within = overlap > 0.0 ? all[0].distance + std::max(0.5 * overlap, 0.006 * reach) : 1.006 * reach;
+      for (std::size_t k = 0; k < std::min<std::size_t>(all.size(), 3); ++k) {
+        if (all[k].distance > within * (1.0 - 1e-9)) break;
+        const double near = 1e-2 * one.surface->grain();
+        const bool known = std::any_of(told.begin(), told.end(),
+                                       [&](const Foot& foot) { return (foot.point - all[k].point).norm() <= near; });
+        // A search cut short may begin somewhere else, and end at others that are as near.
+        const bool nearer = told.size() == 3 && told[2].distance <= all[k].distance + 1e-9 * reach;
+        missed += known || nearer ? 0 : 1;
+        ++expected;
+      }
+      cut += all.size() > 3 ? 1 : 0;
+      fewer += told.size() < std::min<std::size_t>(all.size(), 3) ? 1 : 0;
+    }
+  }
+  // The nearest always is; another may be a place that only descents from further off than was looked at end at.
+  EXPECT_GT(expected, 1000);
+  EXPECT_LE(missed, expected / 200);
+  EXPECT_GT(cut, 50);
+  EXPECT_GT(fewer, 10);
+}
+
 /// Distance of p to a face's relief, the least around a place of it: by trying, in ever smaller steps.
 double least_around(const ReliefSurface& surface, const ReliefFrame& frame, Vec2 at, double step, const Vec3& p) {
   const auto distance = [&](const Vec2& uv) { return (surface.point(frame, uv.x(), uv.y()).point - p).norm(); };
@@ -407,8 +451,10 @@ TEST(ReliefSearch, feet_are_the_same_to_the_bit_whatever_is_kept_of_earlier_look
       if (i % 3 != 2) p += 0.1 * reach * random_direction(rng);
       ContactSet here;
       ContactSet expected;
-      one.surface->view(with, moment).feet(p, {reach, reach}, here);
-      one.surface->view(without, moment).feet(p, {reach, reach}, expected);
+      // All, or as far as a proxy asks for them.
+      const FeetAsked asked = i % 2 == 0 ? FeetAsked{reach, reach} : FeetAsked{reach, 1.006 * reach, 3, 0.5};
+      one.surface->view(with, moment).feet(p, asked, here);
+      one.surface->view(without, moment).feet(p, asked, expected);
       ASSERT_EQ(here.size(), expected.size()) << one.name << ", case " << i;
       ASSERT_EQ(work_with.done().sum(), work_without.done().sum()) << one.name << ", case " << i;
       felt += expected.empty() ? 0 : 1;

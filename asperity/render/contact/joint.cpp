@@ -9,10 +9,6 @@ namespace asperity {
 namespace {
 
 constexpr int most_attempts = 4;
-// Of what a ball overlaps, a look tells so many places, and of what it overlaps most this share: three hold it, and
-// pushed out of these it is looked again.
-constexpr std::size_t most_feet = 12;
-constexpr double deepest_share = 0.5;
 // Between two walls a ball is pushed from one to the other, each time by less.
 constexpr int most_pushes = 12;
 // On a relief a move of this share of its finest grain is not worth making, on what bends smoothly of this one; on
@@ -92,40 +88,6 @@ bool JointSolve::plane_off(std::size_t index, const Vec3& local, const Foot& foo
   return true;
 }
 
-/// Planes that keep the ball off all that it touches or would on the next step from here: of a relief what there is, of
-/// others the nearest place and what is known already.
-const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position) noexcept {
-  const double beyond = std::clamp(stride_, 0.006 * radius_, 0.25 * radius_);
-  if (last_feet_.index == index && last_feet_.position == position && last_feet_.beyond == beyond)
-    return last_feet_.planes;
-  last_feet_.index = index;
-  last_feet_.position = position;
-  last_feet_.beyond = beyond;
-  last_feet_.planes.clear();
-  Entry& entry = entries_[index];
-  const Vec3 local = entry.touch->to_local(position);
-  ContactSet feet;
-  const double touching = radius_ + gap(entry) + 2.0 * entry.skin;
-  const auto* relief = std::get_if<ReliefView>(&entry.touch->view);
-  if (relief != nullptr) {
-    relief->feet(local,
-                 {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
-                 feet);
-  } else {
-    const Foot foot = on_smooth_view(
-        entry.touch->view, [&](const auto& view) { return view.nearest(local, touching + beyond, entry.near); });
-    if (foot.found()) feet.push_back(foot);
-  }
-  keep_following(index, position, relief != nullptr ? touching + beyond : 0.0, feet);
-  for (std::size_t i = 0; i < feet.size(); ++i) {
-    Place place;
-    ConstraintPlane plane;
-    if (plane_off(index, local, feet[i], place, plane)) last_feet_.planes.push_back(plane);
-    if (i == 0) entry.near = place;
-  }
-  return last_feet_.planes;
-}
-
 void JointSolve::remember(const ConstraintPlane& plane) noexcept {
   // One plane a direction: the newest.
   constexpr double same_direction = 0.999;
@@ -173,7 +135,7 @@ void JointSolve::touched(const Vec3& position, PlaneSet& out) noexcept {
   }
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
-    if (leads_ball(entry)) {
+    if (knows_feet(entry)) {
       if (following_) {
         followed_planes(i, position, out);
       } else {
@@ -273,11 +235,11 @@ bool JointSolve::push_out(Vec3& position) noexcept {
     bool clear = true;
     // Of those that tell all, what is there now.
     for (std::size_t k = held.size(); k-- > 0;) {
-      if (leads_ball(entries_[held[k].owner])) held.swap_remove(k);
+      if (knows_feet(entries_[held[k].owner])) held.swap_remove(k);
     }
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       if (!entries_[i].smooth) continue;
-      if (leads_ball(entries_[i])) {
+      if (knows_feet(entries_[i])) {
         for (const ConstraintPlane& foot : feet_planes(i, position)) {
           if (!held.push_back(foot)) return false;
           if (foot.offset + foot.skin - foot.normal.dot(position) <= 0.25 * entries_[i].skin) continue;

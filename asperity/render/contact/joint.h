@@ -72,7 +72,7 @@ class JointSolve {
     Vec3 point = Vec3::Zero();
     Vec3 normal = Vec3::Zero();  ///< unit, away from the side that is touched
   };
-  /// What a look at a relief has found, to be followed until the next.
+  /// A place that a ball may rest on, found by a look and followed until the next.
   struct Followed {
     std::size_t index = 0;
     Foot foot;
@@ -136,8 +136,8 @@ class JointSolve {
   void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
 
-  /// Whether a ball is led along all that it may rest on there, followed from one look to the next.
-  [[nodiscard]] bool leads_ball(const Entry& entry) const noexcept { return radius_ > 0.0 && !facets_ && entry.smooth; }
+  /// Whether all that a ball may rest on there is known: told at once, or followed from one look to the next.
+  [[nodiscard]] bool knows_feet(const Entry& entry) const noexcept;
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   [[nodiscard]] bool plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
                                ConstraintPlane& plane) const noexcept;

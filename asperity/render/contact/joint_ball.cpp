@@ -12,8 +12,14 @@ namespace {
 
 // A stride is no longer than this share of the radius: what it comes to is then still in front of the centre.
 constexpr double longest_stride = 0.25;
-// What it may come to is foreseen for a stride of this share.
+// What it may come to is foreseen for a stride of this share at most, and where it rests for this one: what it lay
+// between at the last tick it is not to meet anew.
 constexpr double farthest_foreseen = 0.02;
+constexpr double least_foreseen = 0.006;
+// Of what a ball overlaps, a look tells so many places, and of what it overlaps most this share: three hold it, and
+// pushed out of these it is looked again.
+constexpr std::size_t most_feet = 12;
+constexpr double deepest_share = 0.5;
 // Curvature that a step reckons with at least, as a share of that of the distance to the goal: where less is left, the
 // place is hardly held, or not at all, and strides are what is long enough.
 constexpr double least_curvature = 0.1;
@@ -26,6 +32,8 @@ constexpr int most_restores = 8;
 constexpr double overlap_weighs = 1.5;
 // A ball may overlap what it touches by this share of how far it is kept off.
 constexpr double found_of_margin = 5e-4;
+// Of what is worth a move: a stride that is to be no longer is none.
+constexpr double least_room = 0.01;
 
 /// What holds a step, in the metric in which the distance to the goal is as round as near the place.
 struct Metric {
@@ -49,6 +57,10 @@ Mat3 bend_at_distance(const Mat3& bend, double distance) noexcept {
 }
 
 }  // namespace
+
+bool JointSolve::knows_feet(const Entry& entry) const noexcept {
+  return radius_ > 0.0 && entry.smooth && (!facets_ || std::holds_alternative<ReliefView>(entry.touch->view));
+}
 
 /// The second derivative of the distance from what a plane is of, where the ball's centre is.
 Mat3 JointSolve::bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept {
@@ -108,6 +120,40 @@ Vec3 JointSolve::bent_step(const PlaneSet& planes, const PlaneProjection& flat, 
   return step;
 }
 
+/// Planes that keep the ball off all that it touches or would on the next step from here: of a relief what there is, of
+/// others the nearest place and what is known already.
+const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position) noexcept {
+  const double beyond = std::clamp(stride_, least_foreseen * radius_, longest_stride * radius_);
+  if (last_feet_.index == index && last_feet_.position == position && last_feet_.beyond == beyond)
+    return last_feet_.planes;
+  last_feet_.index = index;
+  last_feet_.position = position;
+  last_feet_.beyond = beyond;
+  last_feet_.planes.clear();
+  Entry& entry = entries_[index];
+  const Vec3 local = entry.touch->to_local(position);
+  ContactSet feet;
+  const double touching = radius_ + gap(entry) + 2.0 * entry.skin;
+  const auto* relief = std::get_if<ReliefView>(&entry.touch->view);
+  if (relief != nullptr) {
+    relief->feet(local,
+                 {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
+                 feet);
+  } else {
+    const Foot foot = on_smooth_view(
+        entry.touch->view, [&](const auto& view) { return view.nearest(local, touching + beyond, entry.near); });
+    if (foot.found()) feet.push_back(foot);
+  }
+  keep_following(index, position, relief != nullptr ? touching + beyond : 0.0, feet);
+  for (std::size_t i = 0; i < feet.size(); ++i) {
+    Place place;
+    ConstraintPlane plane;
+    if (plane_off(index, local, feet[i], place, plane)) last_feet_.planes.push_back(plane);
+    if (i == 0) entry.near = place;
+  }
+  return last_feet_.planes;
+}
+
 /// Where a place that is followed is led to by a ball whose centre is now `local`.
 Foot JointSolve::led_to(const Entry& entry, const Vec3& local, const Foot& foot) noexcept {
   if (const auto* relief = std::get_if<ReliefView>(&entry.touch->view)) return relief->follow(local, foot);
@@ -118,6 +164,7 @@ Foot JointSolve::led_to(const Entry& entry, const Vec3& local, const Foot& foot)
     auto spot = view.at(place, front);
     view.descend(place, spot, {.point = local, .may_leave = false});
     Foot led{spot.point, Vec3::Zero(), (local - spot.point).norm(), place.element, place.at};
+    if constexpr (requires { view.element_at(spot.point); }) led.element = view.element_at(spot.point);
     led.normal = side * view.front(led);
     return led;
   });
@@ -175,9 +222,9 @@ void JointSolve::followed_planes(std::size_t index, const Vec3& position, PlaneS
     if (one.index != index) continue;
     const Vec3 off = local - one.foot.point;
     const double distance = off.norm();
+    if (distance > touching + longest_stride * radius_) continue;
     // Of what is bent somewhat more than the ball is round, the nearest place may be nearer by as much as that.
     const double beside = off.cross(one.foot.normal).squaredNorm() / distance;
-    if (distance > touching + 0.25 * radius_) continue;
     if (!one.stays && position != one.position && distance - 2.0 * beside <= touching + as_near * radius_) {
       one.foot = led_to(entry, local, one.foot);
       one.position = position;
@@ -362,7 +409,7 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
     if (inner.room <= tolerance_) break;
     rests = !plan(place, there, inner);
     if (rests) break;
-    if (!make(inner, place, there) && inner.room <= 0.01 * tolerance_) break;
+    if (!make(inner, place, there) && inner.room <= least_room * tolerance_) break;
   }
   following_ = false;
   const auto nearer = [&](const Vec3& next) {
@@ -378,23 +425,22 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
     return true;
   }
   for (const ConstraintPlane& plane : met) {
-    if (leads_ball(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy, true});
+    if (knows_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy, true});
   }
   for (const ConstraintPlane& plane : planes) {
-    if (leads_ball(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy});
+    if (knows_feet(entries_[plane.owner])) follow({plane.owner, plane.contact, proxy});
   }
   return false;
 }
 
 void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept {
   constexpr int most_moves = 160;
-  constexpr double least_room = 0.01;  // of what is worth a move
   // Where all that pulls is held, but for next to nothing, moves that come no nearer by as much are none.
   constexpr int look_after = 12;
   constexpr double least_gain = 1e-5;
   double looked_at = infinity;
-  BallMove move{.goal = goal, .room = longest_stride * radius_};
   constexpr int most_vain_leaps = 3;
+  BallMove move{.goal = goal, .room = longest_stride * radius_};
   int vain_leaps = 0;
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
