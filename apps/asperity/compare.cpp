@@ -248,16 +248,56 @@ void add_law_facts(const std::vector<Rival>& rivals, std::vector<ReportFact>& fa
   }
 }
 
-Result<int> compare(const CompareOptions& options, const Console& console) {
-  const Progress progress = console.progress();
-  ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress, !options.one_way));
-  const fs::path folder =
-      options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
+Result<std::vector<Rival>> parse_rivals(const std::vector<std::string>& names) {
   std::vector<Rival> rivals;
-  for (const std::string& name : options.laws.empty() ? suitable_rivals(experiment) : options.laws) {
+  for (const std::string& name : names) {
     ASPERITY_TRY(Rival rival, parse_rival(name));
     rivals.push_back(std::move(rival));
   }
+  return rivals;
+}
+
+/// The first that touches with a point; empty: none does.
+std::string of_a_point(const std::vector<Rival>& rivals) {
+  for (const Rival& rival : rivals) {
+    const Result<Law> law = law_by_name(rival.law);
+    if (law && !law->takes_ball()) return rival.law;
+  }
+  return {};
+}
+
+/// The scene, and what is compared on it: all with one radius, which is 0 where any of them touches with a point,
+/// unless the scene says it.
+struct Compared {
+  Experiment experiment;
+  std::vector<Rival> rivals;
+};
+Result<Compared> load_compared(CompareOptions& options, const Progress& progress) {
+  ASPERITY_TRY(std::vector<Rival> rivals, parse_rivals(options.laws));
+  std::string point = of_a_point(rivals);
+  if (!point.empty()) options.scene.unstated_radius = "0";
+  ASPERITY_TRY(Experiment experiment, load_scene(options.scene, progress, !options.one_way));
+  if (rivals.empty()) {
+    ASPERITY_TRY(rivals, parse_rivals(default_rivals(experiment.scene)));
+    point = of_a_point(rivals);
+    if (!point.empty() && experiment.scene.probe_radius() > 0.0) {
+      options.scene.unstated_radius = "0";
+      ASPERITY_TRY(experiment, load_scene(options.scene, progress, !options.one_way));
+    }
+    ASPERITY_TRY(rivals, parse_rivals(suitable_rivals(experiment)));
+  }
+  if (!point.empty() && experiment.scene.probe_radius() == 0.0)
+    experiment.notes.push_back(fmt::format("all are compared with a point: \"{}\" touches with one", point));
+  return Compared{std::move(experiment), std::move(rivals)};
+}
+
+Result<int> compare(CompareOptions options, const Console& console) {
+  const Progress progress = console.progress();
+  ASPERITY_TRY(const Compared compared, load_compared(options, progress));
+  const Experiment& experiment = compared.experiment;
+  const std::vector<Rival>& rivals = compared.rivals;
+  const fs::path folder =
+      options.out.empty() ? fs::path("out") / (folder_name(experiment.name) + "-compare") : fs::path(options.out);
   // Every pair is checked before anything is run or written.
   Representations representations(options, experiment, progress);
   for (const Rival& rival : rivals) {

@@ -167,10 +167,11 @@ void change_surface(Json& surface, const SceneArgument& a) {
 void change_device(Json& scene, const SceneArgument& a) {
   put(scene, "device", a.device);
   put(scene, "hand", a.hand);
-  if ((a.rate + a.probe + a.probe_radius).empty()) return;
+  if ((a.rate + a.probe + a.probe_radius + a.unstated_radius).empty()) return;
   Json& probe = member(scene, "probe");
   put(probe, "rate", a.rate);
   put(probe, "kind", a.probe);
+  if (!probe.is_object() || !probe.contains("radius")) put(probe, "radius", a.unstated_radius);
   put(probe, "radius", a.probe_radius);
 }
 
@@ -222,7 +223,10 @@ void add_scene_options(Arguments& command, SceneArgument& a) {
   command.option("--hand", a.hand, "Hand: default, light, firm, paper (with --probe dynamic)").group("Touch");
   command.option("--rate", a.rate, "Force updates a second: 1kHz").group("Touch");
   command.option("--probe", a.probe, "ideal, or dynamic: a simulated hand that holds the device").group("Touch");
-  command.option("--probe-radius", a.probe_radius, "Radius of the tip: 0.5mm; 0 is a point").group("Touch");
+  command
+      .option("--probe-radius", a.probe_radius,
+              "Radius of the tip: 1mm; 0 is a point. Without: 0.5mm where every law takes a ball")
+      .group("Touch");
 }
 
 Result<SceneText> find_scene(const std::string& scene) {

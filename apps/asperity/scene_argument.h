@@ -20,6 +20,7 @@ struct SceneArgument {
   std::string felt_as;  ///< "mesh", "relief", "implicit": every surface that has a mesh, whatever the scene says
   std::string depth, force, speed;
   std::string device, hand, rate, probe, probe_radius;
+  std::string unstated_radius;  ///< the probe's, where neither the scene nor probe_radius says it; empty: the default
 };
 
 /// Adds SCENE and the options that change it.

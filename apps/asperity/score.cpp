@@ -249,6 +249,8 @@ void add_score(Arguments& program, Console& console, Action& action) {
   Arguments command = program.command("score", "Score laws on a measured trajectory: a probe's path with its forces");
   auto options = std::make_shared<ScoreOptions>();
   options->scene.scene.clear();
+  // Of what was measured, the place of a tip's middle is known where its radius is said.
+  options->scene.unstated_radius = "0";
   command
       .option("FILE", options->file,
               "CSV with the columns time, x, y, z, fx, fy, fz in the scene's frame, units as suffix or in brackets "

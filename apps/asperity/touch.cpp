@@ -69,6 +69,33 @@ class TraceOutput {
   TraceWriter writer_;
 };
 
+/// What to change where the device's force was not enough; empty: it was.
+std::string force_advice(const Experiment& experiment, const RunResult& run) {
+  std::size_t limited = 0;
+  double farthest = 0.0;
+  double when = 0.0;
+  for (const TraceRecord& tick : run.records) {
+    if (!tick.rendered.flags.has(TickFlag::force_limited)) continue;
+    ++limited;
+    const double behind = (tick.rendered.proxy - tick.probe.pose.position).norm();
+    if (!(behind > farthest)) continue;
+    farthest = behind;
+    when = tick.probe.time.count();
+  }
+  if (limited == 0) return {};
+  std::string text = fmt::format("the device's {:g} N are reached in {} ticks", experiment.device.max_force, limited);
+  std::string change = "--depth, --force or --stiffness lower";
+  if (farthest > 0.0) {
+    const double radius = experiment.scene.settings().probe_radius;
+    const double larger = radius > 0.0 ? 2.0 * radius : 0.5e-3;
+    text += fmt::format(": the probe is led up to {} past what holds it (at {:.3g} s)", format_length(farthest), when);
+    change =
+        fmt::format("a larger tip (--probe-radius {:g}mm) does not get behind what this one does; ", 1e3 * larger) +
+        change;
+  }
+  return text + ". To change: " + change;
+}
+
 Result<RunReport> build_report(const Experiment& experiment, const RunResult& run, const Console& console,
                                const Progress& progress, bool with_picture) {
   RunReport report;
@@ -80,6 +107,8 @@ Result<RunReport> build_report(const Experiment& experiment, const RunResult& ru
   report.metrics = measure_run(run.records, report.series, experiment.path);
   report.metrics.energy.account = account_rows(run.account);
   if (report.metrics.ticks.contact == 0) report.origin.warnings.push_back("the probe never touched anything");
+  if (std::string advice = force_advice(experiment, run); !advice.empty())
+    report.origin.warnings.push_back(std::move(advice));
   if (with_picture) {
     ASPERITY_TRY(report.picture, render_picture(experiment.scene, experiment.path, run.records, {}, progress));
   }

@@ -30,8 +30,14 @@ inline constexpr double stopped_in_skins = 0.75;
 inline constexpr double reached_in_skins = 0.0025;
 /// A ball resting within this many skins of a triangle touches it.
 inline constexpr double touch_in_skins = 2.0;
-/// A ball whose motion is shorter than this share of its radius is judged at its end.
+/// A ball whose motion is shorter than this share of its radius is judged by what is near its end.
 inline constexpr double glide_of_radius = 0.25;
+/// How far off the end (m) what such a motion of this length has come too near to on its way can be: to a place that it
+/// was off by a radius at its start. [servo]
+inline double passed_within(double length, double radius) noexcept {
+  constexpr double of_square = 0.55;
+  return of_square * length * length / radius;
+}
 
 /// The foot of `p` on a triangle: its normal is the face's inside the face, and points to `p` on edges and corners.
 /// [servo]
@@ -94,6 +100,26 @@ inline void sweep_triangle(std::uint32_t element, const Vec3& a, const Vec3& b, 
   best.hit = true;
   best.t = t_stop;
   best.contact = triangle_foot(element, at_stop, motion.from + best.t * direction, cross.normalized(), tolerance);
+}
+
+/// Whether a ball that moves along `motion` stays `least` (m) off triangle (a, b, c), whose place nearest to the end is
+/// `at_end`: there, and on its way, unless it is nearer at the start and goes away from there. Its distance is convex
+/// along the motion, and so above its tangents at both ends. False where these do not tell. [servo]
+inline bool stays_off(const Vec3& a, const Vec3& b, const Vec3& c, const Segment& motion, const TrianglePoint& at_end,
+                      double least) noexcept {
+  if (at_end.squared_distance <= least * least) return false;
+  const Vec3 way = motion.to - motion.from;
+  const double end = std::sqrt(at_end.squared_distance);
+  const double end_slope = (motion.to - at_end.point).dot(way) / end;
+  if (end - end_slope > least) return true;
+  const TrianglePoint at_start = closest_point_on_triangle(motion.from, a, b, c);
+  const double start = std::sqrt(at_start.squared_distance);
+  if (!(start > 0.0)) return false;
+  const double start_slope = (motion.from - at_start.point).dot(way) / start;
+  if (start_slope >= 0.0) return true;
+  // Where both tangents meet.
+  const double t = (end - end_slope - start) / (start_slope - end_slope);
+  return start + start_slope * t > least;
 }
 
 /// Triangles near a place, the nearest first and equally near ones by number, in whatever order they were found; of

@@ -131,16 +131,19 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
-bool TriangleIndex::glides_to(const Vec3& end, double radius, Sides sides, double touch,
-                              TrianglePatch& patch) const noexcept {
+bool TriangleIndex::glides(const Segment& motion, double length, double radius, Sides sides, double touch,
+                           TrianglePatch& patch) const noexcept {
+  const Vec3& end = motion.to;
   const double margin = error(end);
   const double blocked = radius + blocked_in_skins * tolerance_.skin;
+  const double within = touch + passed_within(length, radius);
   NearTriangles near;
   bool free = true;
-  scan_ball(end, touch, patch, [&](std::uint32_t face, double distance, const Vec3&) {
-    if (distance > touch + margin || !free) return;
+  scan_ball(end, within, patch, [&](std::uint32_t face, double distance, const Vec3&) {
+    if (distance > within + margin || !free) return;
     const ClosestHit at = near_at(face, end);
-    free = at.point.squared_distance > blocked * blocked;
+    const auto [a, b, c] = mesh().corners(face);
+    free = stays_off(a, b, c, motion, at.point, blocked);
     near.offer(at, touch);
   });
   if (!free) return false;
@@ -180,7 +183,7 @@ SweptHit TriangleIndex::sweep_part(const Segment& motion, double radius, Sides s
            !ensure(motion.from, touch + length, patch);
   };
   const bool long_motion = length > long_motion_in_edges * mesh().mean_edge();
-  if (!long_motion && length < glide_of_radius * radius && glides_to(motion.to, radius, sides, touch, patch)) {
+  if (!long_motion && length < glide_of_radius * radius && glides(motion, length, radius, sides, touch, patch)) {
     return best;
   }
   if (long_motion || crowded()) {

@@ -119,9 +119,7 @@ class TriangleIndex {
   }
 
   /// First touch of a ball of `radius` (m, plus skin) moving along `motion`. Triangles seen from behind at the start
-  /// are passed through when `sides` is front. A ball's motion
-  /// shorter than a quarter of its radius is judged at its end: on the way a triangle may come nearer than at both ends
-  /// by at most length^2 / (8 radius), and cannot be passed. [servo]
+  /// are passed through when `sides` is front. [servo]
   [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept;
   /// Every distinct plane that a ball of `radius` (m) resting at `position` touches within two skins. [servo]
   void contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch, ContactSet& out) const noexcept;
@@ -149,8 +147,9 @@ class TriangleIndex {
   [[nodiscard]] double error(const Vec3& position) const noexcept;
   [[nodiscard]] SweptHit sweep_part(const Segment& motion, double radius, Sides sides,
                                     TrianglePatch& patch) const noexcept;
-  /// Whether nothing reaches into the ball at the end of a short motion; if so, remembers what it touches there.
-  bool glides_to(const Vec3& end, double radius, Sides sides, double touch, TrianglePatch& patch) const noexcept;
+  /// Whether nothing reaches into the ball on a short motion; if so, remembers what it touches at its end.
+  bool glides(const Segment& motion, double length, double radius, Sides sides, double touch,
+              TrianglePatch& patch) const noexcept;
   void remember(const Vec3& position, double radius, Sides sides, const ContactSet& contacts,
                 TrianglePatch& patch) const noexcept;
   [[nodiscard]] ClosestHit near_at(std::uint32_t face, const Vec3& position) const noexcept;

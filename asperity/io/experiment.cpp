@@ -138,10 +138,33 @@ SurfaceProjector projector(const Scene& scene) {
   };
 }
 
+bool says_radius(const SceneJson* probe) {
+  return probe != nullptr && probe->contains("radius");
+}
+
 /// The probe's radius ahead of the probe, whose defaults depend on the surfaces.
 double probe_radius_of(const SceneJson* probe) {
-  const bool given = probe != nullptr && probe->contains("radius");
-  return given ? from_option<double>(value_of((*probe)["radius"], OptionType::quantity(Dimension::length))) : 0.0;
+  return says_radius(probe) ? from_option<double>(value_of((*probe)["radius"], OptionType::quantity(Dimension::length)))
+                            : default_probe_radius;
+}
+
+/// A ball where all of the scene can be felt by one, else a point; says which. `settings`: the scene's, but for it.
+double default_radius(std::span<const Instance> instances, SceneSettings settings, SceneContext& context) {
+  if (instances.empty()) return 0.0;
+  settings.probe_radius = default_probe_radius;
+  const std::string chosen = fmt::format("(probe.radius or --probe-radius chooses otherwise)");
+  if (settings.tip_radius > 0.0) {
+    context.note("probe: a point, which follows the path of probe.tip " + chosen);
+    return 0.0;
+  }
+  for (const Instance& instance : instances) {
+    const Status taken = takes_ball(instance, settings);
+    if (taken) continue;
+    context.note(fmt::format("probe: a point, because of \"{}\": {}", instance.name, taken.error().what));
+    return 0.0;
+  }
+  context.note(fmt::format("probe: a ball of {} {}; 0 is a point", format_length(settings.probe_radius), chosen));
+  return settings.probe_radius;
 }
 
 Result<std::vector<Instance>> read_surfaces(ObjectReader& root, SceneContext& context, SceneJson& canonical) {
@@ -210,12 +233,16 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
   ASPERITY_TRY(ScenePart<ProbeSettings> probe, read_probe(root.raw("probe"), "probe", device.value, stiffness));
   const Box bounds = bodiless ? effect_bounds(effects) : base_bounds(instances);
   SceneSettings settings;
-  settings.probe_radius = probe.value.radius;
   settings.tip_radius = probe.value.tip;
   settings.tool_length = probe.value.tool_length;
   settings.tool_axis = probe.value.tool_axis;
   ASPERITY_TRY(settings.view, read_view(root, bounds));
   ASPERITY_CHECK(read_change(root, settings));
+  if (!says_radius(root.raw("probe"))) {
+    probe.value.radius = default_radius(instances, settings, context);
+    probe.canonical["radius"] = probe.value.radius;
+  }
+  settings.probe_radius = probe.value.radius;
   settings.budget = static_cast<std::uint32_t>(
       root.get("budget", static_cast<int>(SceneSettings::budget_for(settings.probe_radius))));
   note_detail(instances, settings, context);

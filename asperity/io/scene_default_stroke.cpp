@@ -57,6 +57,16 @@ double worth(const LaidSide& side) {
   return drawn > 0.0 && laid > 0.0 ? side.felt * std::min(drawn / laid, laid / drawn) : 0.0;
 }
 
+/// The scene touched with a point: where a stroke is laid does not hang on how large the probe is, and takes no longer.
+Result<Scene> touched_by_point(const Scene& scene) {
+  if (scene.probe_radius() == 0.0) return scene;
+  SceneSettings settings = scene.settings();
+  settings.probe_radius = 0.0;
+  const auto instances = scene.instances();
+  const auto effects = scene.effects();
+  return Scene::build({instances.begin(), instances.end()}, settings, {effects.begin(), effects.end()});
+}
+
 }  // namespace
 
 Result<StrokePath> lay_default_stroke(const Scene& scene, const ProbeSettings& probe, const Box& bounds,
@@ -66,11 +76,14 @@ Result<StrokePath> lay_default_stroke(const Scene& scene, const ProbeSettings& p
   constexpr double enough = 0.25;
   // Of a side that is tried: a stroke has 2000, each of them a search for the nearest point.
   constexpr double trial_samples = 64.0;
+  ASPERITY_TRY(const Scene by_point, touched_by_point(scene));
+  StrokeSettings of_point = stroke.value;
+  of_point.probe_radius = 0.0;
+  LaidSide best{of_point, {}, {}, 0.0};
   Result<StrokePath> first = build_stroke(stroke.value, project);
-  LaidSide best{stroke.value, {}, {}, 0.0};
   if (first) {
-    best.path = *first;
-    ASPERITY_TRY(best.felt, felt_share(scene, best.path, probe, enough));
+    ASPERITY_TRY(best.path, build_stroke(of_point, project));
+    ASPERITY_TRY(best.felt, felt_share(by_point, best.path, probe, enough));
     if (best.felt >= enough) return first;
   }
   const double asked = best.felt;
@@ -79,13 +92,13 @@ Result<StrokePath> lay_default_stroke(const Scene& scene, const ProbeSettings& p
     const int across = side / 2;
     for (const int along : {(across + 1) % 3, (across + 2) % 3}) {
       LaidSide other{
-          over_side(stroke.value, bounds, across, side % 2 == 1, along), {}, names[static_cast<std::size_t>(side)]};
+          over_side(of_point, bounds, across, side % 2 == 1, along), {}, names[static_cast<std::size_t>(side)]};
       StrokeSettings trial = other.settings;
       trial.sample_spacing = (trial.end - trial.start).norm() / trial_samples;
       Result<StrokePath> path = build_stroke(trial, project);
       if (!path) continue;
       other.path = std::move(*path);
-      ASPERITY_TRY(other.felt, felt_share(scene, other.path, probe, 1.0));
+      ASPERITY_TRY(other.felt, felt_share(by_point, other.path, probe, 1.0));
       if (worth(other) > worth(best)) best = std::move(other);
     }
   }
@@ -99,6 +112,7 @@ Result<StrokePath> lay_default_stroke(const Scene& scene, const ProbeSettings& p
                   "contact for {:.0f} % of its way (\"start\" and \"end\" choose otherwise)",
                   asked > 0.0 ? fmt::format("the surface for {:.0f} % of its way", 100.0 * asked) : "nothing",
                   best.name, 100.0 * best.felt));
+  best.settings.probe_radius = stroke.value.probe_radius;
   Result<StrokePath> laid = build_stroke(best.settings, project);
   stroke.value = std::move(best.settings);
   for (const auto& [key, at] : {std::pair("start", stroke.value.start), std::pair("end", stroke.value.end)})

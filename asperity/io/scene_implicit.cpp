@@ -243,7 +243,10 @@ class ImplicitReader {
 
   Status convert(double texture) {
     Reach reach = reach_of(feel_, context_.device);
-    reach.outside += std::max(parts_.offset, feel_.probe_radius) + texture;
+    // A proxy's ball lies on the surface; other laws read the potential where its middle is.
+    reach.outside +=
+        feel_.law.constrains() ? std::max(parts_.offset, feel_.probe_radius) : parts_.offset + feel_.probe_radius;
+    reach.outside += texture;
     reach.inside += texture;
     const Box& bounds = mesh_->mesh().bounds();
     const ConversionSettings settings = read_conversion(reader_, bounds, reach);
@@ -251,6 +254,11 @@ class ImplicitReader {
     ASPERITY_TRY(ConvertedMesh converted, placed(convert_mesh(mesh_->index(), settings, context_.progress)));
     const ConversionReport& report = converted.report;
     for (const std::string& text : report.notes) note(text);
+    if (feel_.probe_radius > 0.0 && !feel_.law.constrains()) {
+      note(fmt::format("stored {} outside, {} of that for the probe's ball: {:.1f} MB",
+                       format_length(converted.grid.outside()), format_length(feel_.probe_radius),
+                       1e-6 * static_cast<double>(converted.grid.memory_bytes())));
+    }
     // A budget is met by a voxel, which then stands for it.
     // In one order, whether they were given or chosen.
     for (const char* key : {"budget", "band_outside", "band_inside", "inside", "shell_thickness"})

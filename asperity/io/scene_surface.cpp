@@ -273,7 +273,7 @@ Result<ScenePart<Instance>> read_surface(const SceneJson& json, const std::strin
   reader.write("law", std::move(law.canonical));
   if (reader.has("implicit") && !reader.has("custom")) {
     // Last: how far its potential is stored depends on how it is felt.
-    const ImplicitFeel feel{instance.law, instance.material, context.probe_radius};
+    const ImplicitFeel feel{instance.law, instance.material, instance.law.takes_ball() ? context.probe_radius : 0.0};
     ASPERITY_CHECK(read_implicit(reader, feel, context, instance));
   }
   if (iso_of(instance.surface) != nullptr) {

@@ -107,6 +107,7 @@ inline Sides sides_of(const Instance& instance) noexcept {
 /// What a tick asks of an instance again and again: found out when the scene is built.
 struct InstanceFacts {
   std::uint64_t identity = 0;   ///< surface_identity
+  double radius = 0.0;          ///< of the probe (m); 0: a point
   Sides sides = Sides::both;    ///< that can be touched
   bool constrains = false;      ///< its law moves the proxy
   bool smooth = false;          ///< and leads it along the surface itself rather than along triangles

@@ -238,6 +238,10 @@ class Law {
   [[nodiscard]] bool is() const noexcept {
     return kind_ == &detail::law_kind<L>;
   }
+  /// Whether a probe with a radius feels it: forms as printed are of points. [any]
+  [[nodiscard]] bool takes_ball() const noexcept {
+    return (constrains() || facts().ball) && formulation() != Formulation::literal;
+  }
   /// The triangles that its proxy goes along. [servo]
   [[nodiscard]] LawFacets facets() const noexcept {
     return kind_->facets == nullptr ? LawFacets{} : kind_->facets(settings_.get());

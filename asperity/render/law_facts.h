@@ -46,8 +46,11 @@ struct LawFacts {
   bool linear = false;     ///< pushes by the material's stiffness times the penetration
   bool retards = false;    ///< by the material's dynamic friction, where no friction law is named
   bool own_place = false;  ///< looks the material up itself, where its contact point is: it is given the instance's
-  bool unpaid = false;     ///< built in: felt as its authors have it, what it gives is paid by nobody
-  unsigned compared = 0;   ///< LawCompared
+  /// Without a proxy: in its own form a probe with a radius feels it too, from where the surface lies that much farther
+  /// out (TouchedSurface::probe_radius). Laws with a proxy lead the ball.
+  bool ball = false;
+  bool unpaid = false;    ///< built in: felt as its authors have it, what it gives is paid by nobody
+  unsigned compared = 0;  ///< LawCompared
 };
 
 /// How far outside of a surface a law reads its potential.

@@ -37,14 +37,19 @@ Status make_dense(Instance& instance, std::size_t index) {
 }
 
 /// Whether the law's reach lies within the band that the potential is stored in.
-Status check_potential(const Instance& instance, const std::string& place) {
+Status check_potential(const Instance& instance, const std::string& place, const SceneSettings& settings) {
   const ImplicitSurface& surface = *implicit_of(instance.surface);
   const LawReach reach = instance.law.outside();
-  if (reach.distance <= surface.reach_outside()) return success();
-  return bad_value(fmt::format("is {}, and \"{}\" stores its potential up to {} outside", format_length(reach.distance),
-                               instance.name, format_length(surface.grid().outside())),
-                   fmt::format("{}.law.{}", place, reach.option),
-                   fmt::format("at most {}, or a wider implicit.band_outside", format_length(surface.reach_outside())));
+  // In the hand's lengths, as the law and the probe are.
+  const double most = settings.view.zoom * (surface.reach_outside() - surface.offset());
+  if (reach.distance + settings.probe_radius <= most) return success();
+  const bool of_law = reach.distance > most;
+  return bad_value(fmt::format("is {}, and \"{}\" stores its potential up to {} outside",
+                               format_length(of_law ? reach.distance : settings.probe_radius), instance.name,
+                               format_length(surface.grid().outside())),
+                   of_law ? fmt::format("{}.law.{}", place, reach.option) : std::string("probe.radius"),
+                   fmt::format("at most {}, or a wider implicit.band_outside",
+                               format_length(std::max(0.0, of_law ? most : most - reach.distance))));
 }
 
 /// What a law needs that the surface has not; nothing where it has all.
@@ -70,22 +75,29 @@ std::string lacking(const Law& law, const Instance& instance) {
   return law.lacks(instance);
 }
 
+/// Names of the built-in and registered laws that can be felt on a surface, by those of them that `takes` holds for.
+template <class Takes>
+std::string laws_for(const Instance& instance, const Takes& takes) {
+  std::string names;
+  for (const LawKind* kind : law_kinds()) {
+    const Law law(*kind);
+    if (takes(law) && lacking(law, instance).empty())
+      names += (names.empty() ? "" : ", ") + std::string(kind->facts->name);
+  }
+  return names;
+}
+
 /// Whether the law can be felt on the surface at all.
 Status check_pair(const Instance& instance, const std::string& place) {
   const std::string lacks = lacking(instance.law, instance);
-  if (lacks.empty())
-    return instance.law.facts().needs == LawNeeds::potential ? check_potential(instance, place) : success();
+  if (lacks.empty()) return success();
   constexpr const char* kinds[] = {"a bare mesh",          "a relief",
                                    "an isosurface",        "an implicit surface",
                                    "a parametric surface", "a surface of its own"};
-  std::string others;
-  for (const LawKind* kind : law_kinds()) {
-    if (lacking(Law(*kind), instance).empty()) others += (others.empty() ? "" : ", ") + std::string(kind->facts->name);
-  }
   return refused(ErrorCode::unsupported_pair,
                  fmt::format("the law \"{}\" needs {}, and \"{}\" is {}", law_name(instance.law), lacks, instance.name,
                              kinds[instance.surface.index()]),
-                 place + ".law", others);
+                 place + ".law", laws_for(instance, [](const Law&) { return true; }));
 }
 
 /// Whether what a coat adds beside its heights can be felt by the law.
@@ -120,7 +132,19 @@ Status check_coat(const Instance& instance, const std::string& place, double pro
   return success();
 }
 
-Status check(const Instance& instance, std::size_t index, double probe_radius) {
+/// Whether the law feels a probe of that radius, as far out as it has to.
+Status check_radius(const Instance& instance, const std::string& place, const SceneSettings& settings) {
+  if (settings.probe_radius > 0.0 && !instance.law.takes_ball()) {
+    return refused(ErrorCode::unsupported_pair,
+                   fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
+                               law_name(instance.law), format_length(settings.probe_radius)),
+                   place + ".law",
+                   laws_for(instance, [](const Law& law) { return law.takes_ball(); }) + ", or probe.radius 0");
+  }
+  return instance.law.facts().needs == LawNeeds::potential ? check_potential(instance, place, settings) : success();
+}
+
+Status check(const Instance& instance, std::size_t index, const SceneSettings& settings) {
   const std::string place = fmt::format("surfaces[{}]", index);
   if (std::visit([](const auto& surface) { return surface == nullptr; }, instance.surface)) {
     return bad_value("holds no surface", place + ".surface",
@@ -128,18 +152,10 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
   }
   ASPERITY_CHECK(check_pair(instance, place));
   ASPERITY_CHECK(check_fine(instance, place));
-  ASPERITY_CHECK(check_coat(instance, place, probe_radius));
+  ASPERITY_CHECK(check_coat(instance, place, settings.probe_radius));
   if (auto valid = validate(instance.law); !valid) return std::move(valid).error().at(place + ".law");
   if (auto valid = validate(instance.material); !valid) return std::move(valid).error().at(place + ".material");
-  if (probe_radius > 0.0 && !instance.law.constrains()) {
-    return refused(ErrorCode::unsupported_pair,
-                   fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
-                               law_name(instance.law), format_length(probe_radius)),
-                   place + ".law",
-                   base_of(instance.surface) != nullptr && iso_of(instance.surface) == nullptr
-                       ? "proxy, god-object or force-shading, or probe.radius 0"
-                       : "proxy, or probe.radius 0");
-  }
+  ASPERITY_CHECK(check_radius(instance, place, settings));
   const Pose& pose = instance.world_from_object;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
       std::abs(pose.orientation.norm() - 1.0) > 1e-9) {
@@ -150,6 +166,12 @@ Status check(const Instance& instance, std::size_t index, double probe_radius) {
 }
 
 }  // namespace
+
+Status takes_ball(const Instance& instance, const SceneSettings& settings) {
+  ASPERITY_CHECK(check_pair(instance, instance.name));
+  ASPERITY_CHECK(check_coat(instance, instance.name, settings.probe_radius));
+  return check_radius(instance, instance.name, settings);
+}
 
 namespace {
 
@@ -270,10 +292,11 @@ bool changes(const Instance& instance) {
   return feels_changing_coat(instance);
 }
 
-InstanceFacts facts_of(const Instance& instance) {
+InstanceFacts facts_of(const Instance& instance, double probe_radius) {
   const Material& material = instance.material;
   InstanceFacts facts;
   facts.identity = surface_identity(instance.surface);
+  facts.radius = probe_radius;
   facts.sides = sides_of(instance);
   facts.constrains = instance.law.constrains();
   facts.smooth = follows_smoothly(instance);
@@ -343,7 +366,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
   Scene scene;
   scene.settings_ = settings;
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    ASPERITY_CHECK(check(instances[i], i, settings.probe_radius));
+    ASPERITY_CHECK(check(instances[i], i, settings));
     ASPERITY_CHECK(check_motion(instances[i], i));
     if (settings.view.zoom != 1.0 && relief_of(instances[i]) == nullptr && has_local_material(instances[i])) {
       return refused(ErrorCode::unsupported_pair,
@@ -381,7 +404,7 @@ Result<Scene> Scene::build(std::vector<Instance> instances, const SceneSettings&
     for (FieldEffect& effect : scene.felt_effects_) effect = magnified(effect, settings.view.zoom);
   }
   for (const Instance& instance : scene.felt_) {
-    scene.facts_.push_back(facts_of(instance));
+    scene.facts_.push_back(facts_of(instance, scene.probe_radius()));
     scene.changes_ = scene.changes_ || scene.facts_.back().changes;
     scene.draws_ = scene.draws_ || scene.facts_.back().draws;
   }

@@ -42,6 +42,10 @@ struct SceneSettings {
   static constexpr std::uint32_t budget_for(double probe_radius) noexcept { return probe_radius > 0.0 ? 0 : 600; }
 };
 
+/// Whether a ball of the settings' radius can be felt on an instance; otherwise why not.
+/// Errors: unsupported_pair, bad_value. [build]
+Status takes_ball(const Instance& instance, const SceneSettings& settings);
+
 /// Validated and immutable: `step` cannot fail on it. Copies share the surfaces.
 class Scene {
  public:

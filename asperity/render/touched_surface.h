@@ -19,6 +19,8 @@ class TouchedSurface {
   }
   /// Those that can be touched. [servo]
   [[nodiscard]] Sides sides() const noexcept { return touch_->facts->sides; }
+  /// Of the probe's ball (m), whose middle is what a law is asked about; 0 is a point. [servo]
+  [[nodiscard]] double probe_radius() const noexcept { return touch_->facts->radius; }
   /// What it is, for laws of one kind of surface. [servo]
   [[nodiscard]] const Instance& instance() const noexcept { return *touch_->instance; }
   /// All that the tick knows of it, for laws within render. [servo]

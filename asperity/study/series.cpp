@@ -132,12 +132,17 @@ class SeriesBuilder {
   struct Felt {
     Pose pose;   ///< of the object
     Vec3 force;  ///< the hand's (N)
-    Vec3 point;  ///< the proxy, or the probe where the law has none
+    /// The proxy, or the probe where the law has none; of a ball that is led, where it touches.
+    Vec3 point;
+    double above;  ///< how far a ball's middle is above what it touches, if it is that (m)
   };
   [[nodiscard]] Felt in_object(const Instance& instance, const TraceRecord& tick) const {
     const Pose pose = pose_of(instance, tick);
-    return {pose, pose.rotate_inverse(force_in_scene(tick)),
-            pose.apply_inverse(instance.law.constrains() ? tick.rendered.proxy : in_scene(tick))};
+    const double radius = scene_.probe_radius();
+    const bool led = instance.law.constrains();
+    const Vec3& proxy = radius > 0.0 ? tick.rendered.contact.point : tick.rendered.proxy;
+    return {pose, pose.rotate_inverse(force_in_scene(tick)), pose.apply_inverse(led ? proxy : in_scene(tick)),
+            led ? 0.0 : radius};
   }
 
   [[nodiscard]] const Instance* touched(const TraceRecord& tick) const {
@@ -198,7 +203,7 @@ class SeriesBuilder {
     if (const CustomSurface* custom = custom_of(shape)) return smooth(*custom);
     const MeshSurface& base = *base_of(shape);
     const bool proxied = instance->law.constrains();
-    const auto [pose, force, felt] = in_object(*instance, tick);
+    const auto [pose, force, felt, above] = in_object(*instance, tick);
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     BasePoint at = base_point(base, felt, cache);
     if (at.face == no_index) return;
@@ -207,7 +212,7 @@ class SeriesBuilder {
     const ReliefSurface* relief = relief_of(*instance);
     const bool moves = relief != nullptr && relief->coat().moves();
     in_shell(shape, felt, cache, {0.0, moves ? tick.probe.time.count() : 0.0}, at);
-    add_height(shape, at, proxied ? 0.0 : force.dot(at.up) / scene_stiffness(*instance, tick), force);
+    add_height(shape, at, (proxied ? 0.0 : force.dot(at.up) / scene_stiffness(*instance, tick)) - above, force);
     add_direction(*instance, shape, at, force);
     if (const Coat* coat = coat_of(shape)) {
       const Vec3 along = pose.rotate_inverse(tangent);
@@ -242,7 +247,7 @@ class SeriesBuilder {
   template <class View>
   void add_smooth(const Instance& instance, const View& view, const Box& bounds, const TraceRecord& tick,
                   bool either_side) {
-    auto [pose, force, felt] = in_object(instance, tick);
+    auto [pose, force, felt, above] = in_object(instance, tick);
     if (!instance.law.constrains()) felt += force / scene_stiffness(instance, tick);
     const Foot foot = view.nearest(felt, bounds.diagonal());
     if (!foot.found()) return;
@@ -251,7 +256,7 @@ class SeriesBuilder {
     const double over = (felt - foot.point).dot(front) < 0.0 ? -foot.distance : foot.distance;
     double height = 0.0;
     if constexpr (std::is_same_v<View, ParametricView>) height = view.spot(foot.at.template head<2>()).height;
-    out_.followed.back() = side * (height + over) - scene_.probe_radius();
+    out_.followed.back() = side * (height + over) - above;
     out_.relief.back() = side * height;
     if (!(force.norm() >= least_force) || front.isZero()) return;
     const Vec3 outward = side * front;
@@ -282,7 +287,7 @@ class SeriesBuilder {
 
   /// Heights over the mesh where a texture, or an offset, is what is felt.
   void add_texture(const Instance& instance, const ImplicitSurface& surface, const TraceRecord& tick) {
-    const auto [pose, force, felt] = in_object(instance, tick);
+    const auto [pose, force, felt, above] = in_object(instance, tick);
     SurfaceCache& cache = caches_[tick.rendered.contact.instance];
     const BasePoint at = base_point(*surface.mesh(), felt, cache);
     if (at.face == no_index) return;
@@ -290,7 +295,7 @@ class SeriesBuilder {
     const double reach = std::max(surface.grid().outside(), -surface.grid().inside());
     const Vec3 base = felt - at.height * at.up;
     const SweptHit met = surface.view(cache).first_touch({base + reach * at.up, base - reach * at.up}, Sides::front);
-    out_.followed.back() = met.hit ? at.height + deflection - scene_.probe_radius() : no_sample;
+    out_.followed.back() = met.hit ? at.height + deflection - above : no_sample;
     out_.relief.back() = met.hit ? reach * (1.0 - 2.0 * met.t) : no_sample;
     out_.near_edge.back() = near_sharp_edge(*surface.mesh(), base) ? 1 : 0;
   }
@@ -320,7 +325,7 @@ class SeriesBuilder {
     const TriangleMesh& mesh = base_mesh(shape);
     const bool from_behind = force.dot(mesh.face_normal(at.face)) < 0.0 && !coat;
     const double height = from_behind ? -at.height : at.height;
-    out_.followed.back() = height + deflection - scene_.probe_radius();
+    out_.followed.back() = height + deflection;
     out_.relief.back() = coat ? at.relief : 0.0;
   }
 

@@ -261,6 +261,49 @@ TEST(TriangleIndex, SweepStopsWhereTheBallFirstTouches) {
   }
 }
 
+// A motion of a few hundredths of the radius past an edge, off which the ball is at both ends.
+TEST(TriangleIndex, ShortMotionsOfABallAreJudgedAlongTheirWay) {
+  Rng rng(66);
+  for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
+    const TriangleIndex index =
+        TriangleIndex::build(TriangleMesh::build(random_closed_mesh(9, 2, 0.05, 0.5)).value(), structure);
+    const Box around = index.mesh().bounds().grown(0.01);
+    const double skin = index.skin();
+    int only_on_the_way = 0;
+    int free = 0;
+    for (int i = 0; i < 6000; ++i) {
+      const double radius = rng.uniform(0.001, 0.01);
+      // Off some place by less than is left of the way's bow, and across it.
+      const Vec3 near = random_point(rng, around);
+      const Foot foot = index.closest(near, infinity);
+      const double length = rng.uniform(0.02, 0.249) * radius;
+      const Vec3 out = (near - foot.point).normalized();
+      const Vec3 across = out.cross(random_point(rng, around)).normalized();
+      const Vec3 middle = foot.point + (radius - rng.uniform(-0.2, 1.0) * length * length / (8.0 * radius)) * out;
+      const Segment motion{middle - 0.5 * length * across, middle + 0.5 * length * across};
+      if (index.closest(motion.from, infinity).distance < radius + 2.0 * skin) continue;
+      TrianglePatch patch;
+      const SweptHit hit = index.sweep(motion, radius, Sides::both, patch);
+      const double reached = hit.hit ? hit.t : 1.0;
+      double least = infinity;
+      for (int j = 0; j <= 100; ++j) {
+        const Vec3 x = motion.from + (reached * j / 100.0) * (motion.to - motion.from);
+        least = std::min(least, index.closest(x, infinity).distance);
+      }
+      ASSERT_GT(least, radius) << i;
+      if (hit.hit) {
+        EXPECT_NEAR(index.closest(motion.from + hit.t * (motion.to - motion.from), infinity).distance, radius,
+                    2.0 * skin);
+        only_on_the_way += index.closest(motion.to, infinity).distance > radius + 2.0 * skin ? 1 : 0;
+      } else {
+        ++free;
+      }
+    }
+    EXPECT_GT(only_on_the_way, 100);
+    EXPECT_GT(free, 100);
+  }
+}
+
 // Where more triangles are near than a patch holds: a fine sheet over one whose triangles are far larger, so that a
 // motion of the mean edge is long against the fine ones.
 TEST(TriangleIndex, SweepThroughACrowdOfSmallTrianglesMeetsTheFirst) {

@@ -62,6 +62,11 @@ TEST_F(ImplicitScene, LawsThatReachOutGetABandForIt) {
     const Experiment e = good(box(R"({"resolution":40})", R"(,"law":)" + std::string(law)));
     EXPECT_GE(implicit(e).reach_outside(), 0.003) << law;
   }
+  const Experiment ball =
+      good(R"({"surfaces":[{"mesh":{"generator":"box","size":[0.04,0.04,0.04]},"implicit":{"resolution":40},
+               "law":{"type":"virtual-contact-point","offset":"3 mm"}}],"probe":{"radius":"2.5 mm"}})");
+  EXPECT_GE(implicit(ball).reach_outside(), 0.0055);
+  EXPECT_TRUE(noted(ball, "for the probe's ball"));
   const Error narrow =
       bad(box(R"({"resolution":40,"band_outside":"4 mm"})", R"(,"law":{"type":"magnetic","band":"3 mm"})"));
   EXPECT_EQ(narrow.place, "surfaces[0].law.band");

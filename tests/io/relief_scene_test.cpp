@@ -29,8 +29,10 @@ class ReliefScene : public ExperimentTest {
   /// A sheet of 80 mm x 80 mm with a coat, and more keys of the scene.
   static std::string scene(const std::string& coat_keys, const std::string& surface = "",
                            const std::string& more = "") {
+    const std::string probe = more.find("\"probe\"") == std::string::npos ? R"(,"probe":{"radius":0})" : "";
     return R"({"surfaces":[{"mesh":{"generator":"plane","width":0.08,"depth":0.08,"columns":4,"rows":4},"coat":{)" +
-           coat_keys + "}" + (surface.empty() ? "" : "," + surface) + "}]" + (more.empty() ? "" : "," + more) + "}";
+           coat_keys + "}" + (surface.empty() ? "" : "," + surface) + "}]" + probe + (more.empty() ? "" : "," + more) +
+           "}";
   }
   static std::string ramp_coat(const std::string& more = "") {
     return R"("height_map":"map.png","height":"0.4 mm","mapping":"triplanar","tile":"20 mm")" +

@@ -70,8 +70,9 @@ TEST_F(VolumeScene, AVolumeIsFittedToTheWorkspaceAndSaysSo) {
   EXPECT_DOUBLE_EQ(surface.threshold(), otsu_threshold(*surface.field().grid()));
 }
 
-// A ball whose top the volume cuts off: over the top the stroke would come in through the volume's border, behind the
-// rim, where nobody knows inside from outside.
+// A ball whose top the volume cuts off: over the top the stroke of a point would come in through the volume's border,
+// behind the rim, where nobody knows inside from outside. (A probe with a radius meets the rim; its stroke is the
+// same.)
 TEST_F(VolumeScene, AStrokeThatNobodyHasPlacedMeetsWhatIsThere) {
   std::vector<float> cut;
   for (int k = 0; k < 7; ++k) {
@@ -102,7 +103,8 @@ TEST_F(VolumeScene, AStrokeThatNobodyHasPlacedMeetsWhatIsThere) {
   };
   const std::string surface = R"("volume":"cut.json","iso":{"threshold":0,"inside":"high"})";
   const Experiment top =
-      good(R"({"surfaces":[{)" + surface + R"(}],"stroke":{"start":["30%","100%","50%"],"end":["70%","100%","50%"]}})");
+      good(R"({"surfaces":[{)" + surface +
+           R"(}],"stroke":{"start":["30%","100%","50%"],"end":["70%","100%","50%"]},"probe":{"radius":0}})");
   EXPECT_LT(contact(top), 0.25);
   EXPECT_FALSE(has_note(top, "stroke:"));
   for (const auto& [law, stroke] : {std::pair("proxy", "{}"), std::pair("cross-uncross", R"({"normal_force":0.5})"),

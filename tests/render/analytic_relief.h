@@ -48,17 +48,19 @@ struct WavySphere {
   }
 };
 
-/// The exact god-object of a point on that sphere: the local minimum of the distance, followed from tick to tick.
+/// The exact god-object of a point on that sphere, or of the middle of a ball that is nowhere as bent as its valleys:
+/// the local minimum of the distance on the surface or on its parallel surface, followed from tick to tick.
 class ExactGodObject {
  public:
-  ExactGodObject(const WavySphere& sphere, const Vec3& probe) : sphere_(sphere), direction_(probe.normalized()) {}
+  ExactGodObject(const WavySphere& sphere, const Vec3& probe, double ball = 0.0)
+      : sphere_(sphere), direction_(probe.normalized()), ball_(ball) {}
 
-  /// The point of the surface nearest to the probe, in the basin that the last one was in.
+  /// The place nearest to the probe, in the basin that the last one was in.
   Vec3 follow(const Vec3& probe) {
     for (int i = 0; i < 200; ++i) {
       const Vec3 x = sphere_.point(direction_);
       const Vec3 n = sphere_.normal(x);
-      const Vec3 rest = probe - x;
+      const Vec3 rest = probe - place(direction_);
       const Vec3 along = rest - rest.dot(n) * n;
       if (along.norm() < 1e-13) break;
       // Along the tangent by what a step of a hundredth finds the best, so that no basin is left.
@@ -68,7 +70,7 @@ class ExactGodObject {
       bool moved = false;
       for (int k = 0; k < 40; ++k, share *= 0.5) {
         const Vec3 trial = (x + share * along).normalized();
-        const double distance = (probe - sphere_.point(trial)).squaredNorm();
+        const double distance = (probe - place(trial)).squaredNorm();
         if (distance >= best) {
           if (moved) break;
           continue;
@@ -80,12 +82,18 @@ class ExactGodObject {
       if (!moved) break;
       direction_ = next;
     }
-    return sphere_.point(direction_);
+    return place(direction_);
   }
 
  private:
+  [[nodiscard]] Vec3 place(const Vec3& direction) const {
+    const Vec3 x = sphere_.point(direction);
+    return ball_ > 0.0 ? Vec3(x + ball_ * sphere_.normal(x)) : x;
+  }
+
   WavySphere sphere_;
   Vec3 direction_;
+  double ball_;
 };
 
 /// The sphere baked onto an icosphere of 20 * 4^subdivisions triangles.

@@ -31,6 +31,43 @@ TEST(CoatMaps, Stiffness_and_friction_are_those_of_the_place) {
   }
 }
 
+// In a valley it touches both walls, its middle over neither place.
+TEST(CoatMaps, A_ball_feels_the_material_of_the_wall_that_it_is_pressed_against) {
+  const double tile = 0.02;
+  const double radius = 3e-3;
+  const double steep = 0.5;
+  const MeshSurface base = sheet();
+  const HeightMap valley = map_of(512, [&](double s, double) { return steep * tile * std::abs(s - 0.5); });
+  const auto scene_of = [&](MaterialChannel channel, double low, double high, double slip) {
+    Instance instance;
+    instance.surface = relief(base, coat_of(base, tiled(valley, tile), {}, map_for(channel, low, high)));
+    instance.material.static_friction = instance.material.dynamic_friction = slip;
+    return must(Scene::build({instance}, radius));
+  };
+  // Walls are touched where they are as steep as the ball: by so much beside the bottom at 10 mm.
+  const double beside = radius * std::sin(std::atan(steep));
+  const Scene soft = scene_of(MaterialChannel::stiffness, 400.0, 1200.0, 0.0);
+  const Scene smooth = scene_of(MaterialChannel::friction, 0.1, 0.5, 1.0);
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 above(0.001, 0.012, 0.010);
+    const Vec3 pressed(0.001, 2e-3, 0.010 + side * 0.3e-3);
+    ProxyState state;
+    touch(soft, state, above);
+    const ForceSample held = touch(soft, state, pressed);
+    ASSERT_EQ(held.contact.places.size(), 2U);
+    const double k = 800.0 + side * 800.0 * beside / (0.5 * tile);
+    EXPECT_NEAR(held.wrench.force.norm() / (held.proxy - pressed).norm(), k, 0.01 * k) << side;
+    // Drawn along the valley it slides by that wall's coefficient.
+    ProxyState drawn;
+    touch(smooth, drawn, above);
+    ForceSample slid;
+    for (int i = 0; i <= 40; ++i) slid = touch(smooth, drawn, pressed + Vec3(1e-4 * i, 0.0, 0.0));
+    const Vec3 push(0.0, slid.wrench.force.y(), slid.wrench.force.z());
+    const double friction = 0.3 + side * 0.4 * beside / (0.5 * tile);
+    EXPECT_NEAR(-slid.wrench.force.x() / push.norm(), friction, 0.05 * friction) << side;
+  }
+}
+
 TEST(CoatMaps, A_stiffness_map_gives_no_energy) {
   const MeshSurface base = sheet();
   for (const char* law : {"proxy", "height-field", "mesostructure"}) {

@@ -50,32 +50,43 @@ struct Touch {
 using PointTouch = Touch<VirtualContactPointLaw>;
 using MagnetTouch = Touch<MagneticLaw>;
 
+/// From a ball up along y to where its torque is told about (m).
+inline constexpr double tool_length = 0.1;
+
 /// The same through whole ticks, which pay for what the law gives.
 struct WholeTouch {
   Scene scene;
   ProxyState state{};
 
+  /// By a ball of `radius` (m), whose middle is led; 0: a point.
   template <class L>
-  explicit WholeTouch(const Touch<L>& touch) : scene(scene_of(touch)) {}
+  explicit WholeTouch(const Touch<L>& touch, double radius = 0.0) : scene(scene_of(touch, radius)) {}
 
   struct Felt {
     Vec3 force;
+    Vec3 torque;
+    Vec3 point;
+    bool contact;
   };
   Felt at(const Vec3& p) {
     ProbeSample probe;
     probe.pose.position = p;
-    return {step(scene, state, probe, Seconds(1e-3)).wrench.force};
+    const ForceSample tick = step(scene, state, probe, Seconds(1e-3));
+    return {tick.wrench.force, tick.wrench.torque, tick.contact.point, tick.flags.has(TickFlag::contact)};
   }
 
  private:
   template <class L>
-  static Scene scene_of(const Touch<L>& touch) {
+  static Scene scene_of(const Touch<L>& touch, double radius) {
     Instance instance;
     instance.name = "implicit";
     instance.surface = touch.surface;
     instance.law = touch.law;
     instance.material = touch.material;
-    return test::must(Scene::build({instance}, 0.0));
+    SceneSettings settings;
+    settings.probe_radius = radius;
+    settings.tool_length = radius > 0.0 ? tool_length : 0.0;
+    return test::must(Scene::build({instance}, settings));
   }
 };
 

@@ -38,7 +38,7 @@ struct SceneContext {
   Progress progress;
   std::vector<std::string> notes;
   std::vector<SharedVolume> volumes;  ///< read so far: entries that say the same share one
-  double probe_radius = 0.0;          ///< m
+  double probe_radius = 0.0;          ///< m; where the scene does not say, what it is where every law takes a ball
 
   void note(std::string text) { notes.push_back(std::move(text)); }
   /// `name` as an absolute path, relative ones from `folder`.
@@ -56,6 +56,9 @@ struct ScenePart {
 Result<ScenePart<DeviceProfile>> read_device(const SceneJson& json, const std::string& place);
 /// Text (a preset) or object. [build]
 Result<ScenePart<HandImpedance>> read_hand(const SceneJson& json, const std::string& place);
+
+/// Of a probe whose radius a scene does not say, where all of it can be felt by a ball (m).
+inline constexpr double default_probe_radius = 0.5e-3;
 
 /// The scene's `probe` object.
 struct ProbeSettings {

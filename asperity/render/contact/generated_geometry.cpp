@@ -292,11 +292,11 @@ bool GeneratedPatch::comes_near(const Segment& motion, double reach) const noexc
   return near;
 }
 
-bool GeneratedPatch::glides_to(const Vec3& end, double radius) const noexcept {
+bool GeneratedPatch::glides(const Segment& motion, double radius) const noexcept {
   const double blocked = radius + blocked_in_skins * tolerance_.skin;
   for (std::uint32_t facet = 0; facet < facets_.size(); ++facet) {
     const auto [a, b, c] = corners(facet);
-    if (closest_point_on_triangle(end, a, b, c).squared_distance <= blocked * blocked) return false;
+    if (!stays_off(a, b, c, motion, closest_point_on_triangle(motion.to, a, b, c), blocked)) return false;
   }
   return true;
 }
@@ -314,7 +314,7 @@ SweptHit GeneratedPatch::segment(const Segment& motion, double radius, Sides sid
     const double left = (1.0 - done) * length;
     const double room = room_around(from, touch, std::min(left, wanted));
     if (!(room > 0.0)) break;
-    if (patch == 0 && length <= room && length < glide_of_radius * radius && glides_to(motion.to, radius)) return best;
+    if (patch == 0 && length <= room && length < glide_of_radius * radius && glides(motion, radius)) return best;
     const double part = room < left ? room / length : 1.0 - done;
     const Segment piece{from, part < 1.0 - done ? Vec3(from + part * way) : motion.to};
     for (std::uint32_t facet = 0; facet < facets_.size(); ++facet) {

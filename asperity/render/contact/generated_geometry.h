@@ -57,8 +57,8 @@ class GeneratedPatch {
   [[nodiscard]] std::uint32_t base_face(std::uint32_t facet) const noexcept {
     return blocks_[facets_[facet].block].face;
   }
-  /// Whether a ball's short motion ends with nothing reaching into it.
-  [[nodiscard]] bool glides_to(const Vec3& end, double radius) const noexcept;
+  /// Whether nothing reaches into a ball on a short motion.
+  [[nodiscard]] bool glides(const Segment& motion, double radius) const noexcept;
   [[nodiscard]] bool comes_near(const Segment& motion, double reach) const noexcept;
 
   const ReliefSurface* surface_ = nullptr;

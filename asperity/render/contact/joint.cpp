@@ -524,22 +524,31 @@ void JointSolve::remember_places(std::size_t index, const ConstraintSolution& so
   if (state.places.empty() && entry.smooth && entry.near.known()) state.places.push_back(entry.near);
 }
 
+const ConstraintPlane* strongest_plane(std::size_t owner, const ConstraintSolution& solution) noexcept {
+  const ConstraintPlane* plane = nullptr;
+  double strongest = 0.0;
+  for (const PlaneProjection::Active& active : solution.projection.active) {
+    if (solution.planes[active.plane].owner != owner || active.multiplier <= strongest) continue;
+    strongest = active.multiplier;
+    plane = &solution.planes[active.plane];
+  }
+  return plane;
+}
+
 LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
   LawForce answer;
+  const ConstraintPlane* plane = strongest_plane(owner, solution);
+  if (plane == nullptr) return answer;
   Vec3 spring = Vec3::Zero();
   double strongest = 0.0;
   double strongest_of_all = 0.0;
-  const ConstraintPlane* plane = nullptr;
   for (const PlaneProjection::Active& active : solution.projection.active) {
     strongest_of_all = std::max(strongest_of_all, active.multiplier);
     if (solution.planes[active.plane].owner != owner) continue;
     spring += active.multiplier * solution.planes[active.plane].normal;
-    if (active.multiplier <= strongest) continue;
-    strongest = active.multiplier;
-    plane = &solution.planes[active.plane];
+    strongest = std::max(strongest, active.multiplier);
   }
-  if (plane == nullptr) return answer;
   answer.contact = true;
   answer.penetration = spring.norm();
   answer.normal = spring / answer.penetration;

@@ -1,6 +1,5 @@
 #pragma once
-// The joint solve: one proxy, a point or a ball, among the surfaces around it. For everything but a point on one smooth
-// surface.
+// The joint solve: one proxy, a point or a ball, among the surfaces around it; not for a point on one smooth surface.
 
 #include <algorithm>
 #include <span>
@@ -22,7 +21,6 @@ class JointSolve {
   JointSolve(double probe_radius, GeneratedPatches* patches, const WorkMeter& work) noexcept
       : radius_(probe_radius), patches_(patches), work_(work) {}
   void add(Touched& touch) noexcept;
-  [[nodiscard]] bool empty() const noexcept { return entries_.empty(); }
 
   /// Leads the ball from `from` to the place nearest to `goal` that the surfaces around leave free (Zilles and
   /// Salisbury 1995). Repeats: planes of what it touches; the point nearest to the goal within them (at most three
@@ -219,7 +217,7 @@ Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const FrictionOf& 
   for (const PlaneProjection::Active& active : projection.active) {
     if (active.multiplier <= strongest) continue;
     strongest = active.multiplier;
-    hold.friction = friction_of(planes[active.plane].owner);
+    hold.friction = friction_of(planes[active.plane]);
   }
   const Vec3 push = projection.point - goal;
   const double length = push.norm();
@@ -291,6 +289,8 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
   return solution;
 }
 
+/// The plane of one owner that pushes most; nullptr: none does. [servo]
+const ConstraintPlane* strongest_plane(std::size_t owner, const ConstraintSolution& solution) noexcept;
 /// Force of one owner among solved planes, world frame: its share of the spring from `goal`, and, for the owner that
 /// pushes most, what friction holds (from the goal on to the probe); finished and damped as its law and material say.
 /// [servo]

@@ -38,7 +38,7 @@ LawForce MagneticLaw::force(const TouchedSurface& touched, const Material& mater
   const ImplicitSurface& surface = touched.touch().implicit();
   return ask_contact_point(touched.touch(), memory, probe, [&](HeldPoint& state) -> LawForce {
     if (formulation == Formulation::consistent)
-      return potential_push({0.0, band, 0.0}, surface, material, probe, velocity, dt, state);
+      return potential_push({touched.probe_radius(), band, 0.0}, surface, material, probe, velocity, dt, state);
     const Potential here = surface.grid().node_gradients(probe, state.cache.sparse);
     const double f = here.value - surface.offset();
     if (f >= 0.0) {

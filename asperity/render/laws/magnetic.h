@@ -6,7 +6,7 @@
 namespace asperity {
 
 /// Magnetic surface (hybrid-surface-2004, Fig. 6b): within a band outside the surface the probe is drawn to it, inside
-/// it is pushed out as by the virtual contact point.
+/// it is pushed out as by the virtual contact point. Of a ball both are measured from where its middle touches.
 ///   literal     attraction k f, which drops to 0 at the band's edge
 ///   consistent  k f (1 - (f / band)^2)^2, the slope of a potential: continuous, and a loop in and out does no work
 struct MagneticLaw {
@@ -16,7 +16,8 @@ struct MagneticLaw {
                                   .needs = LawNeeds::potential,
                                   .linear = true,
                                   .retards = true,
-                                  .own_place = true};
+                                  .own_place = true,
+                                  .ball = true};
   Formulation formulation = Formulation::consistent;
   double band = 0.002;  ///< m, above 0
 

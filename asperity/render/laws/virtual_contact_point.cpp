@@ -25,7 +25,8 @@ LawForce VirtualContactPointLaw::force(const TouchedSurface& touched, const Mate
   const ImplicitSurface& surface = touched.touch().implicit();
   return ask_contact_point(touched.touch(), memory, probe, [&](HeldPoint& state) -> LawForce {
     if (formulation == Formulation::consistent)
-      return potential_push({offset, 0.0, depth_gain}, surface, material, probe, velocity, dt, state);
+      return potential_push({offset + touched.probe_radius(), 0.0, depth_gain}, surface, material, probe, velocity, dt,
+                            state);
     const Potential here = surface.grid().node_gradients(probe, state.cache.sparse);
     if (here.value - surface.offset() >= offset) {
       state.seen_outside = true;

@@ -24,12 +24,13 @@ struct VirtualContactPointLaw {
                                   .linear = true,
                                   .retards = true,
                                   .own_place = true,
+                                  .ball = true,
                                   .compared = on_implicit | literal_too};
   Formulation formulation = Formulation::consistent;
   ContactMagnitude magnitude = ContactMagnitude::distance;  ///< literal alone; the consistent form has one magnitude
   double depth_gain = 0.0;                                  ///< d of eq. 2 (1/m), 0 or more
   /// Offset surface for thin objects (Fig. 6a): the force pushes out to where the potential is this (m), 0 or more;
-  /// direction, friction and material are those of the original surface's point.
+  /// direction, friction and material are those of the original surface's point. A ball adds its radius.
   double offset = 0.0;
 
   using State = ContactPointState;

@@ -22,7 +22,7 @@ void add_contact(Tick& tick, const Touched& touch, const LawForce& law) noexcept
   out.flags.set(TickFlag::contact);
   out.wrench.force += law.force;
   // A ball is pushed where it touches: about its centre nothing but what rubs turns it.
-  if (touch.facts->constrains) out.wrench.torque -= tick.scene.probe_radius() * law.normal.cross(law.force);
+  out.wrench.torque -= touch.facts->radius * law.normal.cross(law.force);
   out.parts.friction += law.friction;
   out.parts.texture += law.texture;
   out.parts.held += law.held;

@@ -156,10 +156,11 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches, const Place& borde
   }
   if (smooth && tick.surfaces_moved) static_cast<void>(joint.push_out(from));
   from = joint.put_down(from);
-  const auto friction_in = [&](std::uint32_t owner) {
-    const Touched& touch = joint.touch(owner);
+  const bool ball = tick.scene.probe_radius() > 0.0;
+  const auto friction_in = [&](const ConstraintPlane& plane) {
+    const Touched& touch = joint.touch(plane.owner);
     MaterialRoom room;
-    return friction_of(touch, material_there(touch, touch.to_local(before), room));
+    return friction_of(touch, material_there(touch, ball ? plane.contact.point : touch.to_local(before), room));
   };
   Vec3 goal = position;
   ConstraintSolution solution;
@@ -178,7 +179,9 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches, const Place& borde
   for (std::size_t i = 0; i < joint.size(); ++i) {
     Touched& touch = joint.touch(i);
     MaterialRoom room;
-    const Material& material = material_there(touch, touch.to_local(solution.proxy), room);
+    const ConstraintPlane* plane = ball ? strongest_plane(i, solution) : nullptr;
+    const Vec3 place = plane != nullptr ? plane->contact.point : touch.to_local(solution.proxy);
+    const Material& material = material_there(touch, place, room);
     Part& part = *tick.parts.emplace_back();
     part = {&touch, owner_force(touch, material, i, solution, goal, *tick.probe), material.stiffness};
     joint.remember_places(i, solution);
