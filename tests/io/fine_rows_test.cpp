@@ -165,7 +165,7 @@ std::string wrapped(const std::string& mapping, const std::string& more = "") {
   return R"({"surfaces":[{"name":"rod","parametric":{"shape":"cylinder","radius":"10 mm","height":"40 mm"},"texture":{)"
          R"("features":{"type":"grating","amplitude":"0.1 mm","wavelength":"9.8696044 mm"},"as":"texture","mapping":{)"
          R"("surface":"cylinder","radius":"10 mm")" +
-         mapping + "}" + more + "}}]}";
+         mapping + "}" + more + R"(}}],"probe":{"radius":0}})";
 }
 
 TEST(Rows, Y2_APartialWrapIsRefusedUntilARangeSaysWhereItsSeamIs) {

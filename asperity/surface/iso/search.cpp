@@ -174,10 +174,12 @@ class NearestSearch {
     // From there the field has to change by `off` before the surface is reached, no faster than its steepest slope; and
     // within a box the way on from the place nearest to p never leads back towards p.
     const double off = here.value(start) - surface_.threshold;
-    const double rise = off / steepest(here);
+    const double steepest = steepest_of(here);
+    const double rise = off / steepest;
     if ((p_ - start).squaredNorm() + rise * rise >= best_ * best_) return;
     const double sign = off >= 0.0 ? 1.0 : -1.0;
-    for (int corner = -1; corner < 8; ++corner) {
+    bool led = false;
+    for (int corner = -1; corner < 8 && !led; ++corner) {
       Vec3 end = here.lower + 0.5 * here.width;
       for (int a = 0; corner >= 0 && a < 3; ++a)
         end[a] = here.lower[a] + ((corner >> a & 1) != 0 ? here.width[a] : 0.0);
@@ -185,12 +187,50 @@ class NearestSearch {
       if (!here.leaves_sign(start, end, 0.0, 1.0, surface_.threshold, sign, t)) continue;
       const Vec3 root = start + t * (end - start);
       if ((root - p_).norm() - here.width.norm() < best_) lead(root);
-      return;
+      led = true;
+    }
+    // What bulges within the cell none of those ways need meet.
+    look_within({here, start, steepest, sign}, here.lower + 0.5 * here.width, 0.5 * here.width, finest_part);
+  }
+
+  /// A cell whose value, less the threshold, has the sign `sign` at `start`, its place nearest to p.
+  struct Bulging {
+    const CellPolynomial& cell;
+    Vec3 start;
+    double steepest;
+    double sign;
+  };
+  static constexpr int finest_part = 3;  ///< how often a cell is halved: to an eighth
+
+  /// Leads to what is nearer than all that is known from parts of a cell whose middle lies beyond the surface, the
+  /// nearest first.
+  void look_within(const Bulging& bulging, const Vec3& middle, const Vec3& half, int halvings) noexcept {
+    const CellPolynomial& cell = bulging.cell;
+    const Vec3 nearest = p_.cwiseMax(middle - half).cwiseMin(middle + half);
+    if ((p_ - nearest).squaredNorm() >= best_ * best_) return;
+    const double off = bulging.sign * (cell.value(middle) - surface_.threshold);
+    if (std::abs(off) > bulging.steepest * half.norm() && off > 0.0) return;
+    if (off <= 0.0) {
+      double t = 0.0;
+      if (cell.leaves_sign(bulging.start, middle, 0.0, 1.0, surface_.threshold, bulging.sign, t)) {
+        const Vec3 root = bulging.start + t * (middle - bulging.start);
+        if ((root - p_).squaredNorm() < best_ * best_) lead(root);
+      }
+    }
+    if (halvings == 0) return;
+    unsigned near = 0;
+    for (int a = 0; a < 3; ++a) near |= p_[a] > middle[a] ? 1U << a : 0U;
+    const Vec3 quarter = 0.5 * half;
+    for (const unsigned off_near : {0U, 1U, 2U, 4U, 3U, 5U, 6U, 7U}) {
+      const unsigned octant = near ^ off_near;
+      Vec3 there = middle;
+      for (int a = 0; a < 3; ++a) there[a] += (octant >> a & 1U) != 0 ? quarter[a] : -quarter[a];
+      look_within(bulging, there, quarter, halvings - 1);
     }
   }
 
   /// Bound on the gradient's length in a cell, above 0.
-  static double steepest(const CellPolynomial& cell) noexcept {
+  static double steepest_of(const CellPolynomial& cell) noexcept {
     double squared = std::numeric_limits<double>::min();
     for (int a = 0; a < 3; ++a) {
       double least = 0.0;
