@@ -136,8 +136,8 @@ Status check_coat(const Instance& instance, const std::string& place, double pro
 Status check_radius(const Instance& instance, const std::string& place, const SceneSettings& settings) {
   if (settings.probe_radius > 0.0 && !instance.law.takes_ball()) {
     return refused(ErrorCode::unsupported_pair,
-                   fmt::format("the law \"{}\" touches with a point, and the probe has a radius of {}",
-                               law_name(instance.law), format_length(settings.probe_radius)),
+                   fmt::format("the law \"{}\" touches with a point, not with a radius of {}", law_name(instance.law),
+                               format_length(settings.probe_radius)),
                    place + ".law",
                    laws_for(instance, [](const Law& law) { return law.takes_ball(); }) + ", or probe.radius 0");
   }

@@ -405,6 +405,12 @@ TEST(StrokesThatOnceFailed, a_long_slip_comes_to_rest_on_the_cone) {
   EXPECT_GT(strokes_again(1, 134, folds).touching, 3000U);
 }
 
+// Beside the corner of a polyhedron a look found nothing for a moment, and a ball that was no nearer than twelve moves
+// before was let go to the probe.
+TEST(StrokesThatOnceFailed, a_ball_that_comes_no_nearer_is_not_let_go) {
+  EXPECT_GT(strokes_again(31128, 11).touching, 3000U);
+}
+
 }  // namespace
 
 }  // namespace asperity::strokes

@@ -445,8 +445,10 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
   for (int i = 0; i < most_moves && !work_.spent(); ++i) {
-    bool on = plan(solution.proxy, solution.planes, move);
-    if (on && i % look_after == look_after - 1) {
+    const bool there = !plan(solution.proxy, solution.planes, move);
+    bool on = !there;
+    // Where nothing is known to hold it, it goes on.
+    if (on && !solution.planes.empty() && i % look_after == look_after - 1) {
       const double distance = (solution.proxy - goal).norm();
       on = distance < looked_at * (1.0 - least_gain);
       looked_at = distance;
@@ -460,7 +462,7 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
     if (on && (make(move, solution.proxy, solution.planes) || move.room > least_room * tolerance_)) continue;
     // At rest, or no move comes nearer: by all that is known to hold it.
     solution.planes = move.around;
-    if (!on && solution.planes.empty()) solution.proxy = move.flat.point;
+    if (there && solution.planes.empty()) solution.proxy = move.flat.point;
     solution.converged = true;
     return;
   }
