@@ -71,13 +71,14 @@ class TraceOutput {
 
 /// What to change where the device's force was not enough; empty: it was.
 std::string force_advice(const Experiment& experiment, const RunResult& run) {
+  const View& view = experiment.scene.settings().view;
   std::size_t limited = 0;
   double farthest = 0.0;
   double when = 0.0;
   for (const TraceRecord& tick : run.records) {
     if (!tick.rendered.flags.has(TickFlag::force_limited)) continue;
     ++limited;
-    const double behind = (tick.rendered.proxy - tick.probe.pose.position).norm();
+    const double behind = (view.to_workspace(tick.rendered.proxy) - tick.probe.pose.position).norm();
     if (!(behind > farthest)) continue;
     farthest = behind;
     when = tick.probe.time.count();
@@ -86,12 +87,14 @@ std::string force_advice(const Experiment& experiment, const RunResult& run) {
   std::string text = fmt::format("the device's {:g} N are reached in {} ticks", experiment.device.max_force, limited);
   std::string change = "--depth, --force or --stiffness lower";
   if (farthest > 0.0) {
-    const double radius = experiment.scene.settings().probe_radius;
-    const double larger = radius > 0.0 ? 2.0 * radius : 0.5e-3;
     text += fmt::format(": the probe is led up to {} past what holds it (at {:.3g} s)", format_length(farthest), when);
-    change =
-        fmt::format("a larger tip (--probe-radius {:g}mm) does not get behind what this one does; ", 1e3 * larger) +
-        change;
+    SceneSettings larger = experiment.scene.settings();
+    larger.probe_radius = larger.probe_radius > 0.0 ? 2.0 * larger.probe_radius : 0.5e-3;
+    const auto instances = experiment.scene.instances();
+    if (std::all_of(instances.begin(), instances.end(), [&](const Instance& i) { return takes_ball(i, larger).ok(); }))
+      change = fmt::format("a larger tip (--probe-radius {:g}mm) does not get behind what this one does; ",
+                           1e3 * larger.probe_radius) +
+               change;
   }
   return text + ". To change: " + change;
 }

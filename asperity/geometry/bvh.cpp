@@ -169,12 +169,13 @@ class Bvh::Builder {
     parallel_for(built.size(), {}, [&](std::size_t i) {
       const Part part = std::move(built[i]);
       std::copy(part.leaves.begin(), part.leaves.end(), bvh_.leaves_.begin() + at[i].leaf);
-      std::transform(part.nodes.begin(), part.nodes.end(), bvh_.nodes_.begin() + at[i].node, [&](Node node) {
+      const std::span<Node> moved(bvh_.nodes_.data() + at[i].node, part.nodes.size());
+      std::copy(part.nodes.begin(), part.nodes.end(), moved.begin());
+      for (Node& node : moved) {
         for (std::uint32_t& child : node.child) {
           if (child != empty_child) child += (child & leaf_bit) != 0 ? at[i].leaf : at[i].node;
         }
-        return node;
-      });
+      }
     });
   }
 

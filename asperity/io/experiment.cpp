@@ -152,7 +152,7 @@ double probe_radius_of(const SceneJson* probe) {
 double default_radius(std::span<const Instance> instances, SceneSettings settings, SceneContext& context) {
   if (instances.empty()) return 0.0;
   settings.probe_radius = default_probe_radius;
-  const std::string chosen = fmt::format("(probe.radius or --probe-radius chooses otherwise)");
+  const std::string chosen = "(probe.radius or --probe-radius chooses otherwise)";
   if (settings.tip_radius > 0.0) {
     context.note("probe: a point, which follows the path of probe.tip " + chosen);
     return 0.0;
@@ -160,7 +160,9 @@ double default_radius(std::span<const Instance> instances, SceneSettings setting
   for (const Instance& instance : instances) {
     const Status taken = takes_ball(instance, settings);
     if (taken) continue;
-    context.note(fmt::format("probe: a point, because of \"{}\": {}", instance.name, taken.error().what));
+    const Error& error = taken.error();
+    context.note(fmt::format("probe: a point, because of \"{}\": {}{}", instance.name,
+                             error.place == "probe.radius" ? "a radius that " : "", error.what));
     return 0.0;
   }
   context.note(fmt::format("probe: a ball of {} {}; 0 is a point", format_length(settings.probe_radius), chosen));
@@ -210,6 +212,25 @@ std::string read_heading(ObjectReader& root, const std::string& fallback) {
   return name;
 }
 
+/// How the scene is touched and seen; the probe's radius where it is not said.
+Result<SceneSettings> read_settings(ObjectReader& root, std::span<const Instance> instances, const Box& bounds,
+                                    ScenePart<ProbeSettings>& probe, SceneContext& context) {
+  SceneSettings settings;
+  settings.tip_radius = probe.value.tip;
+  settings.tool_length = probe.value.tool_length;
+  settings.tool_axis = probe.value.tool_axis;
+  ASPERITY_TRY(settings.view, read_view(root, bounds));
+  ASPERITY_CHECK(read_change(root, settings));
+  if (!says_radius(root.raw("probe"))) {
+    probe.value.radius = default_radius(instances, settings, context);
+    probe.canonical["radius"] = probe.value.radius;
+  }
+  settings.probe_radius = probe.value.radius;
+  settings.budget = static_cast<std::uint32_t>(
+      root.get("budget", static_cast<int>(SceneSettings::budget_for(settings.probe_radius))));
+  return settings;
+}
+
 Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem::path& folder,
                                     const std::string& fallback_name, const Progress& progress) {
   ASPERITY_CHECK(check_version(json));
@@ -232,19 +253,7 @@ Result<Experiment> build_experiment(const SceneJson& json, const std::filesystem
       bodiless ? std::min(1000.0, device.value.max_stiffness) : instances.front().material.stiffness;
   ASPERITY_TRY(ScenePart<ProbeSettings> probe, read_probe(root.raw("probe"), "probe", device.value, stiffness));
   const Box bounds = bodiless ? effect_bounds(effects) : base_bounds(instances);
-  SceneSettings settings;
-  settings.tip_radius = probe.value.tip;
-  settings.tool_length = probe.value.tool_length;
-  settings.tool_axis = probe.value.tool_axis;
-  ASPERITY_TRY(settings.view, read_view(root, bounds));
-  ASPERITY_CHECK(read_change(root, settings));
-  if (!says_radius(root.raw("probe"))) {
-    probe.value.radius = default_radius(instances, settings, context);
-    probe.canonical["radius"] = probe.value.radius;
-  }
-  settings.probe_radius = probe.value.radius;
-  settings.budget = static_cast<std::uint32_t>(
-      root.get("budget", static_cast<int>(SceneSettings::budget_for(settings.probe_radius))));
+  ASPERITY_TRY(const SceneSettings settings, read_settings(root, instances, bounds, probe, context));
   note_detail(instances, settings, context);
   ASPERITY_TRY(ScenePart<StrokeSettings> stroke,
                read_stroke(root.raw("stroke"), "stroke", in_workspace(settings.view, bounds), context));

@@ -17,15 +17,13 @@ void law(SceneObject& row) {
   for (const LawKind* kind : law_kinds()) {
     const LawFacts& facts = *kind->facts;
     what += fmt::format("{}{}: {} ({}{})", what.empty() ? "" : "; ", facts.name, facts.title, facts.source,
-                        Law(*kind).takes_ball() ? "" : "; a point alone");
+                        !Law(*kind).takes_ball()   ? "; a point alone"
+                        : !Law(*kind).constrains() ? "; a ball where the surface lies its radius farther out"
+                                                   : "");
     if (kind->form == nullptr) continue;
     for (const char* form : {"", "-literal"}) two_forms.push_back(std::string(facts.name) + form);
   }
-  row("type", Type::one_of({}, law_names),
-      what +
-          ". Forms as printed are of points; a ball is felt by virtual-contact-point and magnetic where the surface "
-          "lies its radius farther out.",
-      with_default("proxy"));
+  row("type", Type::one_of({}, law_names), what + ". Forms as printed are of points.", with_default("proxy"));
   row("formulation", Type::named<Formulation>(), "As the paper prints it, or with its errata resolved.",
       only_if(Test::is("type", two_forms), by), or_else("consistent, or what the law's name says"));
   for (const LawKind* kind : law_kinds()) {

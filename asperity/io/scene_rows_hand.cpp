@@ -42,9 +42,8 @@ void probe(SceneObject& row) {
       "ideal: exactly on its stroke, or regulated to a normal force. dynamic: a simulated hand that holds the device.",
       with_default(ProbeKind::ideal));
   row("radius", length(not_negative),
-      "Radius of the tip; 0 is a point. Laws of height fields and mesostructures touch with a point, and so do forms "
-      "as "
-      "printed.",
+      "Radius of the tip; 0 is a point. Laws of height fields and mesostructures, and forms as printed, touch with a "
+      "point.",
       &ProbeSettings::radius, or_else("0.5 mm where every law takes a ball, else 0"));
   row("tip", length(not_negative),
       "Radius of the tip whose path a point follows on coats with levels of detail by dilation; 0: a point. Laws touch "

@@ -133,6 +133,42 @@ TEST(OffsetBall, T2_ForcesOfABallOverAnEdgeChangeByTheStep) {
   EXPECT_GT(400 * jumps[0], 0.5 * stiffness * 1e-3);
 }
 
+/// A program's own law that says it takes a ball: a spring to where the surface lies its radius farther out.
+struct OwnSpring {
+  static constexpr LawFacts facts{
+      .name = "own-spring", .title = "a spring off a distance", .source = "this test", .ball = true};
+  static LawForce force(const TouchedSurface& surface, const Material& material, const Vec3& probe, const Vec3&,
+                        Seconds) noexcept {
+    const FieldSample sample = surface.eval(probe);
+    const double depth = surface.probe_radius() - sample.value;
+    LawForce answer;
+    if (!(depth > 0.0)) return answer;
+    answer.contact = true;
+    answer.normal = sample.gradient.normalized();
+    answer.point = probe - sample.value * answer.normal;
+    answer.penetration = depth;
+    answer.push = material.stiffness * depth;
+    answer.force = answer.push * answer.normal;
+    answer.stored = 0.5 * material.stiffness * depth * depth;
+    return answer;
+  }
+};
+
+TEST(OffsetBall, AProgramsOwnLawIsToldTheRadiusIfItTakesABall) {
+  Instance instance;
+  instance.name = "ball";
+  instance.surface = ball();
+  instance.law = OwnSpring{};
+  instance.material.stiffness = stiffness;
+  for (const double ball_radius : {0.0, radius}) {
+    const Scene scene = test::must(Scene::build({instance}, ball_radius));
+    ProxyState state;
+    test::touch(scene, state, far_outside());
+    const ForceSample felt = test::touch(scene, state, Vec3(0.0, sphere + ball_radius - 1e-3, 0.0));
+    EXPECT_NEAR(felt.wrench.force.y(), stiffness * 1e-3, 0.02 * stiffness * 1e-3) << ball_radius;
+  }
+}
+
 TEST(OffsetBall, FormsAsPrintedAreOfPointsAndSaySo) {
   Instance instance;
   instance.name = "ball";

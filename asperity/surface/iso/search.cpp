@@ -209,7 +209,7 @@ class NearestSearch {
     const Vec3 nearest = p_.cwiseMax(middle - half).cwiseMin(middle + half);
     if ((p_ - nearest).squaredNorm() >= best_ * best_) return;
     const double off = bulging.sign * (cell.value(middle) - surface_.threshold);
-    if (std::abs(off) > bulging.steepest * half.norm() && off > 0.0) return;
+    if (off > bulging.steepest * half.norm()) return;
     if (off <= 0.0) {
       double t = 0.0;
       if (cell.leaves_sign(bulging.start, middle, 0.0, 1.0, surface_.threshold, bulging.sign, t)) {
