@@ -119,6 +119,7 @@ Result<Group> measure_mesh(int subdivisions, const Effort& effort, double clock_
   };
   ASPERITY_CHECK(add(god_object_point, {}));
   ASPERITY_CHECK(add(god_object_radius, {.radius = 1e-3}));
+  ASPERITY_CHECK(add("god-object, 5 mm radius", {.radius = 5e-3}));
   ASPERITY_CHECK(add("god-object, point, resting", {.resting = true}));
   ASPERITY_CHECK(add("proxy, point, friction", {.friction = true}));
   ASPERITY_CHECK(add("god-object, point, among 1,000", {.others = 1000}));

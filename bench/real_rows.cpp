@@ -31,6 +31,7 @@ constexpr const char* peer_law = "Embree, 3 mm start radius";
 struct Body {
   std::string name;
   std::string surface;  ///< of a scene, as JSON
+  std::string coat;     ///< of that, as JSON; empty: none
   std::string file;     ///< that has to be there, under the data's folder; empty: none
   bool volume = false;
   double highest = 0.0;  ///< m, of its relief
@@ -57,21 +58,21 @@ std::vector<Body> bodies() {
   for (const Mesh& mesh : meshes) {
     for (const Map& map : maps) {
       for (const double height : {0.3, 1.0, 2.0}) {
+        const std::string coat = fmt::format(R"({{"height_map":"{}","height":"{:g} mm"}})", map.file, height);
         all.push_back({fmt::format("{}, {}, {:g} mm", mesh.name, map.name, height),
-                       fmt::format(R"({{"mesh":"{}","coat":{{"height_map":"{}","height":"{:g} mm"}}}})", mesh.file,
-                                   map.file, height),
-                       mesh.file, false, 1e-3 * height});
+                       fmt::format(R"({{"mesh":"{}","coat":{}}})", mesh.file, coat), coat, mesh.file, false,
+                       1e-3 * height});
       }
     }
   }
   for (const Mesh& mesh : meshes) {
-    all.push_back({mesh.name + std::string(bare_body), fmt::format(R"({{"mesh":"{}"}})", mesh.file), mesh.file, false,
-                   0.0, true});
+    all.push_back({mesh.name + std::string(bare_body), fmt::format(R"({{"mesh":"{}"}})", mesh.file), "", mesh.file,
+                   false, 0.0, true});
   }
-  all.push_back({"vase", R"({"volume":"volumes/vase.vti"})", "volumes/vase.vti", true, 0.0});
-  all.push_back({"carotid", R"({"volume":"volumes/carotid.vtk"})", "volumes/carotid.vtk", true, 0.0});
-  all.push_back({"cavity", R"({"volume":{"generator":"cavity","derive":"vorticity_magnitude"}})", "", true, 0.0});
-  all.push_back({"bunny, potential", R"({"mesh":"meshes/bunny-28k.obj","implicit":{"resolution":128}})",
+  all.push_back({"vase", R"({"volume":"volumes/vase.vti"})", "", "volumes/vase.vti", true, 0.0});
+  all.push_back({"carotid", R"({"volume":"volumes/carotid.vtk"})", "", "volumes/carotid.vtk", true, 0.0});
+  all.push_back({"cavity", R"({"volume":{"generator":"cavity","derive":"vorticity_magnitude"}})", "", "", true, 0.0});
+  all.push_back({"bunny, potential", R"({"mesh":"meshes/bunny-28k.obj","implicit":{"resolution":128}})", "",
                  "meshes/bunny-28k.obj", true, 0.0});
   return all;
 }
@@ -120,6 +121,10 @@ class Carrier {
 
 const char* const real_strokes[] = {"line",        "raster",    "spiral",      "walk with slips",
                                     "pokes 2 m/s", "sweep 0.5", "sweep 5 m/s", "free flight"};
+
+// Rows of two surfaces, one of them a wall.
+constexpr const char* beside_wall = "beside a wall";
+constexpr const char* beside_relief = "beside a relief";
 
 /// Where the wall of the rows with one stands.
 double wall_at(const Box& bounds) {
@@ -241,6 +246,21 @@ Result<Instance> wall_through(const Box& bounds) {
   wall.surface = std::make_shared<const MeshSurface>(TriangleIndex::build(std::move(mesh)));
   wall.sides = Sides::both;
   return wall;
+}
+
+/// The same wall in a body's coat.
+Result<Instance> relief_through(const Box& bounds, const Body& body, const std::filesystem::path& data) {
+  const double size = 2.0 * bounds.diagonal();
+  const Vec3 middle = bounds.centre();
+  std::string coat = body.coat;
+  coat.pop_back();
+  coat += fmt::format(R"(,"mapping":"triplanar","tile":{}}})", 0.25 * bounds.diagonal());
+  const std::string scene =
+      fmt::format(R"({{"surfaces":[{{"mesh":{{"generator":"plane","columns":32,"rows":32,"width":{0},"depth":{0}}},)"
+                  R"("pose":{{"position":[{1},{2},{3}],"axis":[0,1,0],"angle":"90 deg"}},"coat":{4}}}]}})",
+                  size, wall_at(bounds), middle.y(), middle.z(), coat);
+  ASPERITY_TRY(const Experiment experiment, parse_experiment(scene, data, "wall"));
+  return experiment.scene.instances().front();
 }
 
 // ---- rows
@@ -404,7 +424,8 @@ std::vector<Pair> pairs_of(const Body& body, std::size_t number, bool balls, boo
       if ((number + s) % 3 == 0) pairs.emplace_back(real_strokes[s], laws[1 + (number + s / 3) % (laws.size() - 1)]);
     }
   }
-  if (!body.bare) pairs.emplace_back("beside a wall", "proxy");
+  if (!body.bare) pairs.emplace_back(beside_wall, "proxy");
+  if (balls && !body.coat.empty()) pairs.emplace_back(beside_relief, "proxy");
   std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   return pairs;
 }
@@ -416,8 +437,10 @@ Status measure_row(const Body& body, const Experiment& experiment, const RealEff
   std::vector<Instance> instances(read_instances.begin(), read_instances.end());
   Carrier carrier(instances.front());
   std::string led_as = row.stroke;
-  if (row.stroke == "beside a wall") {
-    ASPERITY_TRY(Instance wall, wall_through(carrier.bounds()));
+  if (row.stroke == beside_wall || row.stroke == beside_relief) {
+    const bool plain = row.stroke == beside_wall;
+    ASPERITY_TRY(Instance wall,
+                 plain ? wall_through(carrier.bounds()) : relief_through(carrier.bounds(), body, effort.data));
     instances.push_back(std::move(wall));
     led_as = "raster";
   }
@@ -558,6 +581,37 @@ std::string beside_points(const std::vector<RealRow>& rows) {
   return text;
 }
 
+/// Two surfaces at once beside the same body alone, each median over the dearer of its own: that of the body.
+std::string beside_singles(const std::vector<RealRow>& rows) {
+  constexpr double owed = 3.0;
+  std::string text;
+  for (const char* const stroke : {beside_wall, beside_relief}) {
+    for (const bool point : {true, false}) {
+      std::vector<double> ratio;
+      std::size_t kept = 0;
+      for (const RealRow& both : rows) {
+        if (both.stroke != stroke || (both.radius == 0.0) != point) continue;
+        const auto alone = std::find_if(rows.begin(), rows.end(), [&](const RealRow& row) {
+          return row.body == both.body && row.radius == both.radius && row.stroke == "raster";
+        });
+        if (alone == rows.end()) continue;
+        ratio.push_back(both.times.p50 / std::max(1.0, alone->times.p50));
+        kept += ratio.back() <= owed ? 1U : 0U;
+      }
+      if (ratio.empty()) continue;
+      std::sort(ratio.begin(), ratio.end());
+      text += fmt::format("{:<16} {:<6} {:>5} {:>12.2f} {:>12.2f} {:>8}\n", stroke, point ? "point" : "ball",
+                          ratio.size(), ratio[ratio.size() / 2], ratio.back(), kept);
+    }
+  }
+  if (text.empty()) return text;
+  return fmt::format(
+             "\nTwo surfaces, p50 over that of the body alone (raster), owed {:g}:\n{:<16} {:<6} {:>5} {:>12} "
+             "{:>12} {:>8}\n",
+             owed, "stroke", "probe", "rows", "median", "dearest", "kept") +
+         text;
+}
+
 /// Bare meshes: the god-object's p99.9 against Embree's.
 std::string beside_embree(const std::vector<RealRow>& rows) {
   std::string text;
@@ -598,7 +652,7 @@ std::string real_text(const std::vector<RealRow>& rows) {
       "MB swept before: the least of 20 times. w: work, "
       "in evaluations. open: "
       "ticks whose budget was spent, run: one after the other.\n\n";
-  if (balls) return text + beside_points(rows);
+  if (balls) return text + beside_points(rows) + beside_singles(rows);
   text += "Rows in time: p99.9 at most 20 us, the slowest tick 100 us; at 5 m/s 50 and 200 us.\n";
   text += fmt::format("{:<16} {:>5} {:>12} {:>14} {:>13} {:>14} {:>8} {:>8} {:>8}\n", "body", "rows", "p99.9 kept",
                       "dearest p99.9", "slowest kept", "dearest tick", "not c.", "open", "run");

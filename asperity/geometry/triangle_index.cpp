@@ -16,6 +16,8 @@ constexpr double crowded_motion_in_edges = 0.5;
 constexpr double patch_slack_in_edges = 1.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
+// A ball that slides along a face looks so many times its motion around, an edge at most.
+constexpr double look_in_motions = 8.0;
 
 }  // namespace
 
@@ -131,6 +133,80 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
+void TriangleIndex::look_beside(const Vec3& position, const Foot& rest, double reach,
+                                TrianglePatch& patch) const noexcept {
+  TrianglePatch::Beside& beside = patch.beside;
+  beside.centre = position;
+  beside.clear = reach;
+  beside.listed.clear();
+  const double margin = error(position);
+  const bool rested = patch.rested;
+  scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
+    if (face == rest.element) return;
+    // What is below the plane that the ball rests on is never touched before that.
+    double highest = -infinity;
+    for (const Vec3& corner : mesh().corners(face)) highest = std::max(highest, rest.normal.dot(corner - rest.point));
+    if (highest <= tolerance_.rounding) return;
+    TrianglePatch::Beside::One one{face, distance - margin};
+    if (beside.listed.push_back(one)) return;
+    for (TrianglePatch::Beside::One& other : beside.listed) {
+      if (other.distance > one.distance) std::swap(one, other);
+    }
+    beside.clear = std::min(beside.clear, one.distance);
+  });
+  // What it rests on is where it was, whatever the patch has been filled with.
+  patch.rested = rested;
+}
+
+const Foot* TriangleIndex::rests_on_face(const Vec3& position, double radius, Sides sides,
+                                         const TrianglePatch& patch) const noexcept {
+  if (!(radius > 0.0) || !patch.rested || patch.owner != identity_ || patch.rest_contacts.size() != 1 ||
+      patch.rest_position != position || patch.rest_radius != radius || patch.rest_sides != sides)
+    return nullptr;
+  const Foot& rest = patch.rest_contacts[0];
+  return rest.at.minCoeff() > 0.0 ? &rest : nullptr;
+}
+
+bool TriangleIndex::slides(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
+  if (rests_on_face(motion.from, radius, sides, patch) == nullptr) return false;
+  Foot& rest = patch.rest_contacts[0];
+  const auto [a, b, c] = mesh().corners(rest.element);
+  const TrianglePoint at = closest_point_on_triangle(motion.to, a, b, c);
+  const double touch = radius + touch_in_skins * tolerance_.skin;
+  const double blocked = radius + (blocked_in_skins + reached_in_skins) * tolerance_.skin + tolerance_.rounding;
+  if (!(at.barycentric.minCoeff() > 0.0) || at.squared_distance > touch * touch ||
+      at.squared_distance <= blocked * blocked || rest.normal.dot(motion.to - at.point) < 0.0)
+    return false;
+  TrianglePatch::Beside& beside = patch.beside;
+  if (beside.face != rest.element || beside.radius != radius || beside.normal != rest.normal) {
+    // Only where it stays for longer is it worth a look.
+    beside.face = rest.element;
+    beside.radius = radius;
+    beside.normal = rest.normal;
+    beside.clear = -infinity;
+    return false;
+  }
+  const double length = (motion.to - motion.from).norm();
+  double moved = std::max((motion.to - beside.centre).norm(), (motion.from - beside.centre).norm());
+  if (beside.clear - moved <= touch) {
+    look_beside(motion.from, rest, touch + std::min(look_in_motions * length, mesh().mean_edge()), patch);
+    moved = length;
+    if (beside.clear - moved <= touch) return false;
+  }
+  for (const TrianglePatch::Beside::One& one : beside.listed) {
+    if (one.distance - moved > touch) continue;
+    const ClosestHit end = near_at(one.face, motion.to);
+    if (end.point.squared_distance <= touch * touch) return false;
+    const auto [p, q, r] = mesh().corners(one.face);
+    if (!stays_off(p, q, r, motion, end.point, touch)) return false;
+  }
+  patch.rest_position = motion.to;
+  rest.point = at.point;
+  rest.distance = std::sqrt(at.squared_distance);
+  rest.at = at.barycentric;
+  return true;
+}
+
 bool TriangleIndex::glides(const Segment& motion, double length, double radius, Sides sides, double touch,
                            TrianglePatch& patch) const noexcept {
   const Vec3& end = motion.to;
@@ -154,6 +230,7 @@ bool TriangleIndex::glides(const Segment& motion, double length, double radius, 
 }
 
 SweptHit TriangleIndex::sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
+  if (slides(motion, radius, sides, patch)) return {};
   const Vec3 direction = motion.to - motion.from;
   const double first_part = first_look_in_edges * mesh().mean_edge() / direction.norm();
   if (first_part >= 0.5) return sweep_part(motion, radius, sides, patch);

@@ -123,6 +123,13 @@ class TriangleIndex {
   [[nodiscard]] SweptHit sweep(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept;
   /// Every distinct plane that a ball of `radius` (m) resting at `position` touches within two skins. [servo]
   void contacts(const Vec3& position, double radius, Sides sides, TrianglePatch& patch, ContactSet& out) const noexcept;
+  /// The face that a ball was left resting on at `position`, where that is all that it touches and the foot is inside
+  /// it; nullptr: not known to be so. In `patch`, until the next query. [servo]
+  [[nodiscard]] const Foot* rests_on_face(const Vec3& position, double radius, Sides sides,
+                                          const TrianglePatch& patch) const noexcept;
+  /// Whether such a ball slides along its face past nothing else, and rests on it alone again at its end, which is
+  /// remembered then. Where not, sweep tells what it meets. [servo]
+  bool slides(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept;
 
  private:
   friend class MeshRefitter;
@@ -147,6 +154,7 @@ class TriangleIndex {
   [[nodiscard]] double error(const Vec3& position) const noexcept;
   [[nodiscard]] SweptHit sweep_part(const Segment& motion, double radius, Sides sides,
                                     TrianglePatch& patch) const noexcept;
+  void look_beside(const Vec3& position, const Foot& rest, double reach, TrianglePatch& patch) const noexcept;
   /// Whether nothing reaches into the ball on a short motion; if so, remembers what it touches at its end.
   bool glides(const Segment& motion, double length, double radius, Sides sides, double touch,
               TrianglePatch& patch) const noexcept;

@@ -29,6 +29,20 @@ struct TrianglePatch {
   Vec3 rest_position = Vec3::Zero();  ///< m
   FixedVector<Foot, 4> rest_contacts;
 
+  /// Of a ball that rests on one face: what else it may come to touch while it slides along that.
+  struct Beside {
+    struct One {
+      std::uint32_t face = no_index;
+      double distance = 0.0;  ///< from `centre`, at least (m)
+    };
+    std::uint32_t face = no_index;
+    double radius = 0.0;         ///< m, without skin
+    Vec3 normal = Vec3::Zero();  ///< of the face, on the ball's side
+    Vec3 centre = Vec3::Zero();  ///< m: where the ball was
+    double clear = -infinity;    ///< from there, at least, to what is neither listed nor below the face's plane (m)
+    FixedVector<One, 8> listed;
+  } beside;
+
   // Left uninitialised: only `count` entries are ever read. All in the structure's own units.
   float nearest[capacity / 8];  ///< per block of eight leaves: least distance to `centre`, ascending
   std::uint32_t leaf[capacity];

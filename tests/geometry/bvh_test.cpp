@@ -445,6 +445,70 @@ TEST(TriangleIndex, NoAnswerDependsOnWhatAPatchHolds) {
   EXPECT_GT(several, 1000);
 }
 
+/// A place inside a face, the ball's centre at rest over it.
+Vec3 resting_over(Rng& rng, const TriangleMesh& mesh, double radius, double skin, Vec3& normal) {
+  const std::uint32_t face = rng.below(static_cast<std::uint32_t>(mesh.triangles().size()));
+  const auto corners = mesh.corners(face);
+  Vec3 weights(rng.uniform(0.05, 1.0), rng.uniform(0.05, 1.0), rng.uniform(0.05, 1.0));
+  weights /= weights.sum();
+  normal = mesh.face_normal(face);
+  return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2] + (radius + skin) * normal;
+}
+
+// A ball that stays on one face is not searched for: what else it may touch is listed and left behind in time.
+TEST(TriangleIndex, ABallThatSlidesAlongAFaceAnswersAsSearchesDo) {
+  Rng rng(71);
+  std::vector<TriangleMesh> all = meshes();
+  all.push_back(TriangleMesh::build(random_closed_mesh(9, 4, 0.05, 0.5)).value());
+  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  int slid = 0;
+  int stopped = 0;
+  int listed = 0;
+  for (std::size_t which = 0; which < 2 * all.size(); ++which) {
+    const TriangleIndex index =
+        TriangleIndex::build(all[which / 2], which % 2 == 0 ? SearchStructure::bvh : SearchStructure::octree);
+    const double edge = index.mesh().mean_edge();
+    for (int stroke = 0; stroke < 60; ++stroke) {
+      const double radius = edge * std::pow(10.0, rng.uniform(-1.0, 0.7));
+      const Sides sides = rng.below(2) == 0 ? Sides::both : Sides::front;
+      Vec3 normal;
+      Vec3 position = resting_over(rng, index.mesh(), radius, index.skin(), normal);
+      const Vec3 along = normal.cross(random_unit(rng)).normalized();
+      const double length = edge * std::pow(10.0, rng.uniform(-3.0, -0.5));
+      TrianglePatch kept;
+      ContactSet before;
+      index.contacts(position, radius, sides, kept, before);
+      for (int i = 0; i < 40; ++i) {
+        TrianglePatch cold;
+        ContactSet touched;
+        index.contacts(position, radius, sides, cold, touched);
+        const Vec3 way = (along + 0.2 * normal.cross(random_unit(rng))).normalized();
+        const Segment motion{position, position + length * way};
+        TrianglePatch tried = kept;
+        const bool slides = index.slides(motion, radius, sides, tried);
+        slid += slides ? 1 : 0;
+        listed += slides && !tried.beside.listed.empty() ? 1 : 0;
+        const SweptHit hit = index.sweep(motion, radius, sides, kept);
+        ASSERT_EQ(told(hit), told(index.sweep(motion, radius, sides, cold))) << which << " " << stroke << " " << i;
+        if (hit.hit) {
+          ++stopped;
+          break;
+        }
+        position = motion.to;
+        ContactSet as_kept;
+        ContactSet as_searched;
+        TrianglePatch none;
+        index.contacts(position, radius, sides, kept, as_kept);
+        index.contacts(position, radius, sides, none, as_searched);
+        ASSERT_EQ(told(as_kept), told(as_searched)) << which << " " << stroke << " " << i;
+      }
+    }
+  }
+  EXPECT_GT(slid, 4000);
+  EXPECT_GT(listed, 500);
+  EXPECT_GT(stopped, 100);
+}
+
 // A tree is a way to find things: which triangle an answer names where several are as near is not its to say.
 TEST(TriangleIndex, NoAnswerDependsOnHowTheTreeIsCut) {
   Rng rng(23);

@@ -86,6 +86,66 @@ double height_of_touch(const Scene& scene, double x, double y) {
 
 constexpr double radii[] = {0.3e-3, 1e-3, 3e-3};
 
+/// A ball that is led, each tick also from the same state with nothing kept: by searches and the joint solve.
+struct BesideSearches {
+  double farthest = 0.0;  ///< between both proxies (m)
+  double apart = 0.0;     ///< between both forces (N)
+  int touching = 0;       ///< ticks
+  int sliding = 0;
+};
+
+BesideSearches beside_searches(const Scene& scene, std::span<const Vec3> path) {
+  BesideSearches found;
+  ProxyState state;
+  ProxyCache cache(scene);
+  for (const Vec3& p : path) {
+    ProxyState anew = state;
+    const ForceSample searched = step(scene, anew, probe_at(p), tick);
+    const ForceSample felt = step(scene, state, cache, probe_at(p), tick);
+    found.farthest = std::max(found.farthest, (anew.proxy - state.proxy).norm());
+    found.apart = std::max(found.apart, (felt.wrench.force - searched.wrench.force).norm());
+    found.touching += felt.flags.has(TickFlag::contact) ? 1 : 0;
+    found.sliding += state.sliding ? 1 : 0;
+  }
+  return found;
+}
+
+TEST(BallOnAFace, is_led_as_by_searches_and_the_joint_solve) {
+  MeshSource rough = plane_grid(0.04, 0.04, 60, 60);
+  Rng heights(5);
+  for (Vec3& p : rough.positions) p.z() = heights.uniform(0.0, 1e-4);
+  MeshSource bumps = plane_grid(0.04, 0.04, 40, 40);
+  for (Vec3& p : bumps.positions) p.z() = 3e-4 * std::abs(std::sin(500.0 * p.x()) * std::cos(350.0 * p.y()));
+  const auto on = [](MeshSource source) {
+    return std::make_shared<const MeshSurface>(TriangleIndex::build(mesh_of(std::move(source))));
+  };
+  const Surface surfaces[] = {on(rough), on(plane_grid(0.04, 0.04, 4, 4)), on(bumps)};
+  for (const Surface& surface : surfaces) {
+    for (const double friction : {0.0, 0.4}) {
+      for (const double radius : radii) {
+        const Scene scene = scene_of(surface, radius, friction);
+        Rng rng(31);
+        std::vector<Vec3> path;
+        Vec3 p(2e-3, 1e-3, 0.0);
+        Vec3 way = Vec3::UnitX();
+        for (int i = 0; i < 3000; ++i) {
+          way = (way + 0.2 * Vec3(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), 0.0)).normalized();
+          if (p.head<2>().norm() > 0.012) way = -Vec3(p.x(), p.y(), 0.0).normalized();
+          p += rng.uniform(0.0, 4e-5) * way;
+          // Down through first touch, pressed by up to a millimetre, and off again now and then.
+          p.z() = i % 1000 < 20 ? 6e-3 : radius - 0.5e-3 * (1.0 + std::sin(0.013 * i));
+          path.push_back(p);
+        }
+        const BesideSearches found = beside_searches(scene, path);
+        EXPECT_LT(found.farthest, 1e-9) << friction << " " << radius;
+        EXPECT_LT(found.apart, 1e-9 * stiffness) << friction << " " << radius;
+        EXPECT_GT(found.touching, 1500);
+        EXPECT_GT(found.sliding, friction > 0.0 ? 300 : -1);
+      }
+    }
+  }
+}
+
 // --- T1 ---
 
 /// Work on the hand over a closed loop, once it has been led around it so that it ends as it began.

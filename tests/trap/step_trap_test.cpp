@@ -233,7 +233,7 @@ TEST(PotentialTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
     const Law law = law_by_name(name).value();
     for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
       for (const double radius : {0.0, 0.002}) {
-        if (radius > 0.0 && !law.constrains()) continue;
+        if (radius > 0.0 && !law.takes_ball()) continue;
         const Scene scene = potential_scene(law, reconstruction, radius);
         expect_clean(name, radius > 0.0 ? 300 : 4000, radius, [&](int) -> const Scene& { return scene; });
       }
@@ -249,7 +249,7 @@ TEST(VolumeTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
     const Law law = law_by_name(name).value();
     for (const CellReconstruction reconstruction : {CellReconstruction::trilinear, CellReconstruction::smooth}) {
       for (const double radius : {0.0, 0.002}) {
-        if (radius > 0.0 && law.facts().needs == LawNeeds::field) continue;
+        if (radius > 0.0 && !law.takes_ball()) continue;
         const Scene scene = volume_scene(law, reconstruction, radius, 0.03);
         const Scene other = volume_scene(law, reconstruction, radius, 0.0305);
         // The threshold changes under the probe now and then.
@@ -394,7 +394,7 @@ TEST_P(StepTrap, NeitherAllocatesLocksThrowsNorTouchesFiles) {
   const Law law = law_by_name(GetParam()).value();
   for (const SearchStructure structure : {SearchStructure::bvh, SearchStructure::octree}) {
     for (const double radius : {0.0, 0.002}) {
-      if (radius > 0.0 && !law.constrains()) continue;
+      if (radius > 0.0 && !law.takes_ball()) continue;
       const Scene scene = scene_with(law, structure, radius);
       ProxyState state;
       ProxyCache cache(scene);

@@ -56,6 +56,7 @@ bool JointSolve::complete() const noexcept {
   return all;
 }
 
+/// Whether a ball rests on an edge or corner of a mesh.
 bool JointSolve::rolls(const ConstraintPlane& plane) const noexcept {
   return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
 }
@@ -318,6 +319,18 @@ Vec3 JointSolve::edge_of(const ConstraintPlane& plane) const noexcept {
   return touch.turned((corners[last] - corners[next]).normalized());
 }
 
+/// Where a ball is led that has gone a little too far and touches nothing any more: along what it was about to come to,
+/// in place of straight through that and back by a long motion. The goal, where nothing is that near.
+Vec3 JointSolve::over_what_is_near(const Vec3& position, double gone, const Vec3& goal) noexcept {
+  constexpr double of_motion = 0.5;
+  constexpr double most_of_radius = 0.25;
+  const double near = std::min(of_motion * gone, most_of_radius * radius_);
+  PlaneSet planes;
+  for (std::size_t i = 0; i < entries_.size(); ++i) triangle_planes(i, position, radius_ + margin() + near, planes);
+  const Vec3 along = project_onto_planes(goal, planes, true).point;
+  return (along - position).norm() > tolerance_ ? along : goal;
+}
+
 /// On triangles alone: from one set of planes to the next.
 void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept {
   // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
@@ -330,6 +343,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   PlaneSet& planes = solution.planes;
   double distance = infinity;
   double stride = 1.0;
+  double gone = 0.0;
   Vec3 nearest = solution.proxy;
   int in_vain = 0;
   const auto remember_nearest = [&] {
@@ -349,6 +363,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     touched(solution.proxy, planes);
     const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
     Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
+    if (planes.empty() && move == 1 && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
     const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
     if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target);
     Vec3 step = target - solution.proxy;
@@ -375,6 +390,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     }
     const double t = free_share({solution.proxy, solution.proxy + step});
     solution.proxy = t < 1.0 ? Vec3(solution.proxy + t * step) : Vec3(solution.proxy + step);
+    gone = t * step.norm();
   }
   // Not at rest: of all places that the moves came by, the nearest.
   remember_nearest();

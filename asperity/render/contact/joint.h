@@ -152,6 +152,7 @@ class JointSolve {
   [[nodiscard]] double free_share(const Segment& motion) noexcept;
   [[nodiscard]] double free_share_of_ball(Entry& entry, const Segment& motion) noexcept;
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
+  [[nodiscard]] Vec3 over_what_is_near(const Vec3& position, double gone, const Vec3& goal) noexcept;
   void settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept;
   using CutSet = FixedVector<ConstraintPlane, 8>;
@@ -173,7 +174,6 @@ class JointSolve {
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] bool loosen(const Vec3& position) noexcept;
-  /// Whether a ball rests on an edge or corner of a mesh.
   [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept;
   [[nodiscard]] Vec3 edge_of(const ConstraintPlane& plane) const noexcept;
 

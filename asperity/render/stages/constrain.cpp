@@ -193,6 +193,73 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches, const Place& borde
   }
 }
 
+/// A ball that rests on one face of a mesh, and slides along it to nothing else: what the joint solve makes of one
+/// plane. False, and nothing done but that what is around may have been looked at, where that is not all.
+bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
+  ProxyState& state = tick.state;
+  const auto& view = *std::get_if<TriangleView>(&touch.view);
+  const Sides sides = touch.facts->sides;
+  const double radius = tick.scene.probe_radius();
+  const Vec3& probe = tick.probe->pose.position;
+  const Vec3 from = touch.to_local(state.proxy);
+  const Foot* rest = view.rests_on_face(from, radius, sides);
+  if (rest == nullptr) return false;
+  const auto plane_of = [&](const Foot& foot) -> ConstraintPlane {
+    const Vec3 normal = touch.turned(foot.normal);
+    return {normal, normal.dot(touch.to_world(foot.point)) + radius, view.skin(), 0, foot};
+  };
+  ConstraintPlane plane = plane_of(*rest);
+  // Past its own plane the probe is led off.
+  if (!(plane.offset > plane.normal.dot(probe))) return false;
+  MaterialRoom room;
+  const Friction friction = friction_of(touch, material_there(touch, rest->point, room));
+  const bool rubs = friction.still > 0.0;
+  bool sliding = rubs && state.sliding;
+  const bool held = rubs && holds(friction, state.proxy, plane.normal, probe, sliding);
+  Vec3 proxy = state.proxy;
+  if (!held) {
+    const Vec3 goal = rubs ? friction_goal(proxy, plane.normal, probe, friction.sliding) : probe;
+    const Vec3 to = onto_plane(goal, plane);
+    // A goal on the free side leads off the face.
+    if (to == goal || (rubs && !no_farther(to, proxy, probe))) return false;
+    const Segment motion{from, touch.to_local(to)};
+    if (!view.slides(motion, radius, sides)) return false;
+    plane = plane_of(*rest);
+    proxy = to;
+    if (rubs && !holds(friction, proxy, plane.normal, probe, sliding)) return false;
+  }
+  const double pressed = plane.offset - plane.normal.dot(probe);
+  state.proxy = proxy;
+  state.sliding = sliding || (rubs && !held);
+  const Material& material = material_there(touch, rest->point, room);
+  tick.felt = rubs ? proxy : Vec3(probe + pressed * plane.normal);
+  Part& part = *tick.parts.emplace_back();
+  part = {&touch, {}, material.stiffness};
+  LawForce& law = part.law;
+  law.contact = true;
+  law.penetration = pressed;
+  law.normal = plane.normal;
+  law.spring = law.force = material.stiffness * pressed * plane.normal;
+  finish_by_law(touch, *rest, law);
+  if (rubs) {
+    const Vec3 along = material.stiffness * (proxy - pressed * plane.normal - probe);
+    law.force += along;
+    law.spring += along;
+  }
+  law.force = with_damping(law.force, law.normal, tick.probe->twist.linear, material.damping);
+  law.point = touch.to_world(rest->point);
+  law.element = rest->element;
+  OfSurface& surface = touch.contact->surface;
+  const Vec3 face = view.surface().mesh().face_normal(rest->element);
+  surface.places.clear();
+  surface.places.push_back({rest->element, rest->normal.dot(face) < 0.0, rest->at});
+  surface.height = face.dot(touch.to_local(proxy) - rest->point);
+  surface.normal = rest->normal;
+  surface.rests = false;
+  surface.sliding = state.sliding;
+  return true;
+}
+
 [[gnu::noinline]] void constrain_with_facets(Tick& tick) noexcept {
   GeneratedPatches patches;
   constrain_jointly(tick, &patches, {});
@@ -239,6 +306,11 @@ void constrain(Tick& tick) noexcept {
   const Vec3 before = tick.state.proxy;
   if (alone) tick.state.sliding = last->contact->surface.sliding;
   Place border;
+  if (count == 1 && tick.scene.probe_radius() > 0.0 && !last->facts->smooth && !facets &&
+      constrain_on_face(*last, tick)) {
+    see_what_is_left(tick, before);
+    return;
+  }
   if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick, border); })) {
     if (facets) {
       constrain_with_facets(tick);

@@ -28,6 +28,15 @@ class TriangleView {
     tell(cache_->work, one_query);
     surface_->index().contacts(position, radius, sides, cache_->patch, out);
   }
+  /// The face that a ball was left resting on, alone; nullptr: not known to be so.
+  [[nodiscard]] const Foot* rests_on_face(const Vec3& position, double radius, Sides sides) const noexcept {
+    return surface_->index().rests_on_face(position, radius, sides, cache_->patch);
+  }
+  /// Whether it slides along that and comes to nothing else; then that is what it rests on.
+  [[nodiscard]] bool slides(const Segment& motion, double radius, Sides sides) const noexcept {
+    tell(cache_->work, one_query);
+    return surface_->index().slides(motion, radius, sides, cache_->patch);
+  }
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& = {}) const noexcept {
     tell(cache_->work, one_query);
     return surface_->index().closest(p, bound, cache_->patch);
