@@ -18,6 +18,7 @@ constexpr double patch_slack_in_edges = 1.0;
 constexpr double first_look_in_edges = 0.25;
 // A ball that slides along a face looks so many times its motion around, an edge at most.
 constexpr double look_in_motions = 8.0;
+constexpr double least_slides = 3.0;
 
 }  // namespace
 
@@ -91,6 +92,7 @@ Foot TriangleIndex::closest(const Vec3& p, double bound, TrianglePatch& patch) c
 }
 
 void TriangleIndex::gather(const Vec3& centre, double reach, TrianglePatch& patch) const noexcept {
+  if (patch.owner != identity_) patch.beside.face = no_index;
   if (const Bvh* bvh = std::get_if<Bvh>(&inside_->structure)) return bvh->gather(centre, reach, identity_, patch);
   // The octree keeps to the papers and has no gathering of its own: an empty certificate sends every query to the tree.
   patch.owner = identity_;
@@ -133,6 +135,13 @@ double TriangleIndex::error(const Vec3& position) const noexcept {
   return bvh != nullptr ? bvh->error(position) : 0.0;
 }
 
+bool TriangleIndex::below(std::uint32_t face, const Foot& rest) const noexcept {
+  // What is below the plane that a ball rests on is never touched before that.
+  double highest = -infinity;
+  for (const Vec3& corner : mesh().corners(face)) highest = std::max(highest, rest.normal.dot(corner - rest.point));
+  return highest <= tolerance_.rounding;
+}
+
 void TriangleIndex::look_beside(const Vec3& position, const Foot& rest, double reach,
                                 TrianglePatch& patch) const noexcept {
   TrianglePatch::Beside& beside = patch.beside;
@@ -143,10 +152,7 @@ void TriangleIndex::look_beside(const Vec3& position, const Foot& rest, double r
   const bool rested = patch.rested;
   scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
     if (face == rest.element) return;
-    // What is below the plane that the ball rests on is never touched before that.
-    double highest = -infinity;
-    for (const Vec3& corner : mesh().corners(face)) highest = std::max(highest, rest.normal.dot(corner - rest.point));
-    if (highest <= tolerance_.rounding) return;
+    if (below(face, rest)) return;
     TrianglePatch::Beside::One one{face, distance - margin};
     if (beside.listed.push_back(one)) return;
     for (TrianglePatch::Beside::One& other : beside.listed) {
@@ -167,6 +173,25 @@ const Foot* TriangleIndex::rests_on_face(const Vec3& position, double radius, Si
   return rest.at.minCoeff() > 0.0 ? &rest : nullptr;
 }
 
+bool TriangleIndex::passes_others(const Segment& motion, const Foot& rest, double radius,
+                                  TrianglePatch& patch) const noexcept {
+  const double length = (motion.to - motion.from).norm();
+  if (!(length < glide_of_radius * radius)) return false;
+  const double touch = radius + touch_in_skins * tolerance_.skin;
+  const double within = touch + passed_within(length, radius);
+  const double margin = error(motion.to);
+  const bool rested = patch.rested;
+  bool free = true;
+  scan_ball(motion.to, within, patch, [&](std::uint32_t face, double distance, const Vec3&) {
+    if (!free || face == rest.element || distance > within + margin || below(face, rest)) return;
+    const ClosestHit end = near_at(face, motion.to);
+    const auto [a, b, c] = mesh().corners(face);
+    free = stays_off(a, b, c, motion, end.point, touch);
+  });
+  patch.rested = rested;
+  return free;
+}
+
 bool TriangleIndex::slides(const Segment& motion, double radius, Sides sides, TrianglePatch& patch) const noexcept {
   if (rests_on_face(motion.from, radius, sides, patch) == nullptr) return false;
   Foot& rest = patch.rest_contacts[0];
@@ -178,17 +203,28 @@ bool TriangleIndex::slides(const Segment& motion, double radius, Sides sides, Tr
       at.squared_distance <= blocked * blocked || rest.normal.dot(motion.to - at.point) < 0.0)
     return false;
   TrianglePatch::Beside& beside = patch.beside;
-  if (beside.face != rest.element || beside.radius != radius || beside.normal != rest.normal) {
-    // Only where it stays for longer is it worth a look.
-    beside.face = rest.element;
-    beside.radius = radius;
-    beside.normal = rest.normal;
-    beside.clear = -infinity;
-    return false;
-  }
   const double length = (motion.to - motion.from).norm();
-  double moved = std::max((motion.to - beside.centre).norm(), (motion.from - beside.centre).norm());
+  const auto arrive = [&] {
+    patch.rested = true;
+    patch.rest_position = motion.to;
+    rest.point = at.point;
+    rest.distance = std::sqrt(at.squared_distance);
+    rest.at = at.barycentric;
+    return true;
+  };
+  const bool known = beside.face == rest.element && beside.radius == radius && beside.normal == rest.normal;
+  double moved = infinity;
+  if (known) moved = std::max((motion.to - beside.centre).norm(), (motion.from - beside.centre).norm());
   if (beside.clear - moved <= touch) {
+    // A list is made where it stays for longer; else what is around is looked at for this motion alone.
+    const Vec3 leaves = rest.at - at.barycentric;
+    if (!known || (at.barycentric - least_slides * leaves).minCoeff() <= 0.0) {
+      beside.face = rest.element;
+      beside.radius = radius;
+      beside.normal = rest.normal;
+      beside.clear = -infinity;
+      return passes_others(motion, rest, radius, patch) && arrive();
+    }
     look_beside(motion.from, rest, touch + std::min(look_in_motions * length, mesh().mean_edge()), patch);
     moved = length;
     if (beside.clear - moved <= touch) return false;
@@ -200,11 +236,7 @@ bool TriangleIndex::slides(const Segment& motion, double radius, Sides sides, Tr
     const auto [p, q, r] = mesh().corners(one.face);
     if (!stays_off(p, q, r, motion, end.point, touch)) return false;
   }
-  patch.rest_position = motion.to;
-  rest.point = at.point;
-  rest.distance = std::sqrt(at.squared_distance);
-  rest.at = at.barycentric;
-  return true;
+  return arrive();
 }
 
 bool TriangleIndex::glides(const Segment& motion, double length, double radius, Sides sides, double touch,

@@ -154,6 +154,11 @@ class TriangleIndex {
   [[nodiscard]] double error(const Vec3& position) const noexcept;
   [[nodiscard]] SweptHit sweep_part(const Segment& motion, double radius, Sides sides,
                                     TrianglePatch& patch) const noexcept;
+  /// Whether a triangle lies below the plane that a ball rests on.
+  [[nodiscard]] bool below(std::uint32_t face, const Foot& rest) const noexcept;
+  /// Whether a ball that rests on a face keeps off all that is not below that on a short motion.
+  [[nodiscard]] bool passes_others(const Segment& motion, const Foot& rest, double radius,
+                                   TrianglePatch& patch) const noexcept;
   void look_beside(const Vec3& position, const Foot& rest, double reach, TrianglePatch& patch) const noexcept;
   /// Whether nothing reaches into the ball on a short motion; if so, remembers what it touches at its end.
   bool glides(const Segment& motion, double length, double radius, Sides sides, double touch,

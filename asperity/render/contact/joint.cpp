@@ -322,13 +322,17 @@ Vec3 JointSolve::edge_of(const ConstraintPlane& plane) const noexcept {
 /// Where a ball is led that has gone a little too far and touches nothing any more: along what it was about to come to,
 /// in place of straight through that and back by a long motion. The goal, where nothing is that near.
 Vec3 JointSolve::over_what_is_near(const Vec3& position, double gone, const Vec3& goal) noexcept {
+  // As far as what it has left bends away from its motion; over a sharp edge farther.
   constexpr double of_motion = 0.5;
   constexpr double most_of_radius = 0.25;
-  const double near = std::min(of_motion * gone, most_of_radius * radius_);
-  PlaneSet planes;
-  for (std::size_t i = 0; i < entries_.size(); ++i) triangle_planes(i, position, radius_ + margin() + near, planes);
-  const Vec3 along = project_onto_planes(goal, planes, true).point;
-  return (along - position).norm() > tolerance_ ? along : goal;
+  for (const double near : {passed_within(gone, radius_), std::min(of_motion * gone, most_of_radius * radius_)}) {
+    PlaneSet planes;
+    for (std::size_t i = 0; i < entries_.size(); ++i) triangle_planes(i, position, radius_ + margin() + near, planes);
+    if (planes.empty()) continue;
+    const Vec3 along = project_onto_planes(goal, planes, true).point;
+    return (along - position).norm() > tolerance_ ? along : goal;
+  }
+  return goal;
 }
 
 /// On triangles alone: from one set of planes to the next.
@@ -363,7 +367,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     touched(solution.proxy, planes);
     const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
     Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
-    if (planes.empty() && move == 1 && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
+    if (planes.empty() && move > 0 && move < 4 && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
     const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
     if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target);
     Vec3 step = target - solution.proxy;
