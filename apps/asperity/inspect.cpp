@@ -24,6 +24,7 @@
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/trace_file.h"
 #include "asperity/io/volume_io.h"
+#include "asperity/render/law_registry.h"
 
 namespace asperity::program {
 namespace {

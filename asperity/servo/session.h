@@ -1,5 +1,5 @@
 #pragma once
-// The offline loop: the same tick as the real-time one, as fast as the machine goes.
+// The loop: read, step, safety, record, apply. Offline and in real time it is the same, with another clock.
 
 #include <algorithm>
 #include <chrono>
@@ -11,7 +11,9 @@
 #include "asperity/core/progress.h"
 #include "asperity/core/trace_record.h"
 #include "asperity/device/device.h"
+#include "asperity/servo/loop_clock.h"
 #include "asperity/servo/safety_stage.h"
+#include "asperity/servo/time_histogram.h"
 
 namespace asperity {
 
@@ -30,6 +32,14 @@ struct SessionSummary {
   Flags flags;                ///< every flag that any tick had
   double max_force = 0.0;     ///< largest commanded force (N)
   double step_seconds = 0.0;  ///< time spent in `step`, all ticks; a measurement
+  std::uint64_t missed = 0;   ///< ticks that were due while another one took too long, and are left out
+};
+
+/// What a loop's ticks were like in time, to be read while it runs.
+struct LoopMeters {
+  TimeHistogram period;    ///< from a tick to the next
+  TimeHistogram lateness;  ///< from when a tick was due to when it began
+  TimeHistogram step;      ///< that `step` took
 };
 
 /// Ticks of length `dt` that cover `duration`, its end included. [any]
@@ -60,33 +70,43 @@ void timed_step(Step& step, TraceRecord& tick) {
 
 }  // namespace detail
 
-/// Runs ticks until `device` has finished or `max_ticks` are done: read, step, safety, record, apply.
+/// Runs ticks until `device` has finished or `max_ticks` are done: wait for the clock, read, step, safety, record,
+/// apply.
 ///
 /// `step(const ProbeSample&, Seconds) -> ForceSample` is the renderer with its scene and state bound to it; it is
-/// timed. `record(const TraceRecord&)` gets every tick, before the force is applied; when it returns bool, false stops
+/// timed. Each tick's dt is what the clock says has passed, not what `settings` would have it be. `record(const
+/// TraceRecord&)` gets every tick, before the force is applied; when it returns bool, false stops
 /// the session. The recorded flags are those of `step` and of the safety stage together. The loop itself does not
-/// allocate; neither does a session as long as `step`, `record` and `progress` do not. [servo]
-template <class Step, Device D, class Record>
-SessionSummary run_session(Step&& step, D& device, SafetyStage& safety, const SessionSettings& settings,
-                           Record&& record, const Progress& progress = {}) {
+/// allocate; neither does a session as long as `step`, `record` and `progress` do not. `meters`: may be nullptr.
+/// [servo]
+template <LoopClock Clock, class Step, Device D, class Record>
+SessionSummary run_loop(Clock& clock, Step&& step, D& device, SafetyStage& safety, const SessionSettings& settings,
+                        Record&& record, const Progress& progress = {}, LoopMeters* meters = nullptr) {
   SessionSummary summary;
   const std::uint64_t expected = settings.expected_ticks > 0 ? settings.expected_ticks : settings.max_ticks;
   const std::uint64_t interval = std::max<std::uint64_t>(1, settings.progress_interval);
   TraceRecord tick;
-  tick.dt = settings.dt;
   while (summary.ticks < settings.max_ticks && !device.finished() && !summary.stopped) {
+    const LoopTick due = clock.wait();
     tick.tick = summary.ticks;
+    tick.dt = due.dt;
     tick.probe = device.read();
     tick.hand = std::as_const(device).aim();
     detail::timed_step(step, tick);
-    const SafetyOutput output = safety.apply(tick.rendered, tick.probe, settings.dt);
+    const SafetyOutput output = safety.apply(tick.rendered, tick.probe, tick.dt);
     tick.commanded = output.force;
     tick.rendered.flags = Flags::from_bits(tick.rendered.flags.bits() | output.flags.bits());
     summary.stopped = !detail::keep_going(record, tick);
-    device.apply(output.force, settings.dt);
+    device.apply(output.force, tick.dt);
     summary.flags = Flags::from_bits(summary.flags.bits() | tick.rendered.flags.bits());
     summary.max_force = std::max(summary.max_force, output.force.norm());
     summary.step_seconds += tick.update_seconds;
+    summary.missed += due.missed;
+    if (meters != nullptr) {
+      if (summary.ticks > 0) meters->period.add(due.dt.count());
+      meters->lateness.add(due.lateness);
+      meters->step.add(tick.update_seconds);
+    }
     ++summary.ticks;
     if (progress && summary.ticks % interval == 0) {
       progress("touching", std::min(1.0, static_cast<double>(summary.ticks) / static_cast<double>(expected)));
@@ -94,6 +114,14 @@ SessionSummary run_session(Step&& step, D& device, SafetyStage& safety, const Se
   }
   if (progress) progress("touching", 1.0);
   return summary;
+}
+
+/// The same as fast as the machine goes, every tick of length `settings.dt`. [servo]
+template <class Step, Device D, class Record>
+SessionSummary run_session(Step&& step, D& device, SafetyStage& safety, const SessionSettings& settings,
+                           Record&& record, const Progress& progress = {}) {
+  OfflineClock clock(settings.dt);
+  return run_loop(clock, step, device, safety, settings, record, progress);
 }
 
 }  // namespace asperity

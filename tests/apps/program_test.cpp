@@ -84,7 +84,7 @@ TEST_F(Program, HelpTeaches) {
   const Call help = run("--help");
   EXPECT_EQ(help.code, 0);
   EXPECT_TRUE(has(help.out, "Exit codes"));
-  for (const char* command : {"touch", "compare", "replay", "inspect", "scenes", "bench", "schema"}) {
+  for (const char* command : {"touch", "compare", "replay", "inspect", "scenes", "bench", "schema", "doctor"}) {
     EXPECT_TRUE(has(help.out, command)) << command;
     const Call one = run(std::string(command) + " --help");
     EXPECT_EQ(one.code, 0) << command;
@@ -440,6 +440,26 @@ TEST_F(Program, BenchMeasuresTicks) {
   }
   EXPECT_EQ(document["warm"]["ticks"], 2000);
   EXPECT_TRUE(has(run("bench quick.json --ticks 100 --cold-ticks 2").out, "p99.9"));
+}
+
+TEST_F(Program, DoctorExaminesTheMachine) {
+  const Call call = run("doctor quick.json --seconds 0.3 --rate 2kHz --priority 0 --json");
+  ASSERT_LE(call.code, 1) << call.err;
+  const json document = json::parse(call.out);
+  EXPECT_EQ(document["rate_hz"], 2000.0);
+  ASSERT_EQ(document["parts"].size(), 2u);
+  for (const json& part : document["parts"]) {
+    EXPECT_EQ(part["ticks"], 600);
+    EXPECT_GE(part["lateness"]["max_s"].get<double>(), part["lateness"]["p50_s"].get<double>());
+  }
+  EXPECT_GT(document["parts"][1]["step"]["p50_s"].get<double>(), document["parts"][0]["step"]["p50_s"].get<double>())
+      << "the second part touches a scene";
+  EXPECT_EQ(call.code, document["verdict"] == "unfit" ? 1 : 0);
+  for (const json& asked : document["asked"]) EXPECT_EQ(asked["got"].get<bool>(), asked["advice"] == "");
+  refused("doctor quick.json --rate 100Hz", {"rate", "500 Hz to 40 kHz"});
+  refused("doctor quick.json --cpu 4000", {"cpu", "or -1 for any"});
+  refused("doctor quick.json --priority 100", {"priority"});
+  refused("doctor quick.json --seconds 0", {"seconds"});
 }
 
 TEST_F(Program, ProgressIsShownOnRequest) {
