@@ -158,8 +158,12 @@
 #include "asperity/device/velocity_estimator.h"
 
 // servo: safety stage, session, memory warmed before it
+#include "asperity/servo/loop_clock.h"
+#include "asperity/servo/mailbox.h"
+#include "asperity/servo/realtime.h"
 #include "asperity/servo/safety_stage.h"
 #include "asperity/servo/session.h"
+#include "asperity/servo/time_histogram.h"
 #include "asperity/servo/warm_memory.h"
 
 // io: files of meshes, images, volumes, scenes and traces
