@@ -162,6 +162,7 @@
 #include "asperity/servo/mailbox.h"
 #include "asperity/servo/realtime.h"
 #include "asperity/servo/safety_stage.h"
+#include "asperity/servo/servo_thread.h"
 #include "asperity/servo/session.h"
 #include "asperity/servo/time_histogram.h"
 #include "asperity/servo/warm_memory.h"

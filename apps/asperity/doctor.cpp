@@ -240,8 +240,8 @@ Result<int> doctor(const DoctorOptions& options, const Console& console) {
   for (const RealtimeGrant& grant : grants)
     std::cout << fmt::format("{:<4}{}{}\n", grant.got ? "got" : "no", grant.asked,
                              grant.got ? "" : fmt::format(": {}", grant.why));
-  std::cout << fmt::format("\n{:g} Hz, {:g} s each\n{:<32}{:>12}{:>12}{:>12}{:>12}\n", rate, options.seconds,
-                           "", "p50", "p99", "p99.9", "max");
+  std::cout << fmt::format("\n{:g} Hz, {:g} s each\n{:<32}{:>12}{:>12}{:>12}{:>12}\n", rate, options.seconds, "", "p50",
+                           "p99", "p99.9", "max");
   for (const Part& part : parts) {
     print_row(part.name + ", late by", part.lateness);
     if (&part == &parts.back()) print_row("  its ticks take", part.step);

@@ -137,8 +137,8 @@ TEST(BallOnAFace, is_led_as_by_searches_and_the_joint_solve) {
           path.push_back(p);
         }
         const BesideSearches found = beside_searches(scene, path);
-        EXPECT_LT(found.farthest, 1e-9) << friction << " " << radius;
-        EXPECT_LT(found.apart, 1e-9 * stiffness) << friction << " " << radius;
+        EXPECT_EQ(found.farthest, 0.0) << friction << " " << radius;
+        EXPECT_EQ(found.apart, 0.0) << friction << " " << radius;
         EXPECT_GT(found.touching, 1500);
         EXPECT_GT(found.sliding, friction > 0.0 ? 300 : -1);
       }

@@ -15,7 +15,6 @@ constexpr int most_pushes = 12;
 // triangles near the corner of a valley single moves can be a fraction of the skin long and still lead out of it.
 constexpr double rest_of_grain = 2e-3;
 constexpr double rest_of_smooth_grain = 2e-4;
-constexpr double rest_of_skin = 1e-3;
 constexpr double rest_of_skin_beside_smooth = 0.05;
 // A point is blown up to a ball of this share of the finest grain where it may touch two places of a relief at once.
 constexpr double point_of_grain = 1e-3;
@@ -456,7 +455,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
     }
   } else {
     tolerance_ = infinity;
-    for (const Entry& entry : entries_) tolerance_ = std::min(tolerance_, rest_of_skin * entry.skin);
+    for (const Entry& entry : entries_) tolerance_ = std::min(tolerance_, rest_on_triangles * entry.skin);
     settle_on_triangles(goal, solution);
   }
   solution.projection = project_onto_planes(goal, solution.planes, false);

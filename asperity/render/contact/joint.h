@@ -17,6 +17,7 @@ using GeneratedPatches = FixedVector<GeneratedPatch, most_contacts>;
 /// The instances whose proxy is solved jointly this tick, in the world frame.
 class JointSolve {
  public:
+  static constexpr double rest_on_triangles = 1e-3;  ///< of a skin: moves no longer are not worth making
   /// `patches`: where facets may be generated; `work`: what the tick may look at. [servo]
   JointSolve(double probe_radius, GeneratedPatches* patches, const WorkMeter& work) noexcept
       : radius_(probe_radius), patches_(patches), work_(work) {}
@@ -133,7 +134,6 @@ class JointSolve {
   void settle_point(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
-
   /// Whether all that a ball may rest on there is known: told at once, or followed from one look to the next.
   [[nodiscard]] bool knows_feet(const Entry& entry) const noexcept;
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;

@@ -193,8 +193,24 @@ void constrain_jointly(Tick& tick, GeneratedPatches* patches, const Place& borde
   }
 }
 
-/// A ball that rests on one face of a mesh, and slides along it to nothing else: what the joint solve makes of one
-/// plane. False, and nothing done but that what is around may have been looked at, where that is not all.
+/// The plane of a face that a ball rests on, and how a probe presses it against that.
+struct FacePlane {
+  FacePlane(const Touched& touch, const Foot& foot, double radius, double skin, const Vec3& probe) noexcept {
+    of.normal = touch.turned(foot.normal);
+    of.offset = of.normal.dot(touch.to_world(foot.point)) + radius;
+    of.skin = skin;
+    pressed = of.offset - of.normal.dot(probe);
+    push = (probe + pressed * of.normal) - probe;
+    push /= push.norm();
+  }
+  ConstraintPlane of;
+  double pressed = 0.0;      ///< m; not above 0: the probe is on the free side
+  Vec3 push = Vec3::Zero();  ///< the way to the plane, unit; as it is got from two places
+};
+
+/// A ball that rests on one face of a mesh, and slides along it to nothing else: to the bit what the joint solve makes
+/// of one plane, as that may be all that a tick without a cache has. False, and nothing done but that what is around
+/// may have been looked at, where that is not all.
 bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
   ProxyState& state = tick.state;
   const auto& view = *std::get_if<TriangleView>(&touch.view);
@@ -204,57 +220,63 @@ bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
   const Vec3 from = touch.to_local(state.proxy);
   const Foot* rest = view.rests_on_face(from, radius, sides);
   if (rest == nullptr) return false;
-  const auto plane_of = [&](const Foot& foot) -> ConstraintPlane {
-    const Vec3 normal = touch.turned(foot.normal);
-    return {normal, normal.dot(touch.to_world(foot.point)) + radius, view.skin(), 0, foot};
-  };
-  ConstraintPlane plane = plane_of(*rest);
+  FacePlane plane(touch, *rest, radius, view.skin(), probe);
   // Past its own plane the probe is led off.
-  if (!(plane.offset > plane.normal.dot(probe))) return false;
+  if (!(plane.pressed > 0.0)) return false;
   MaterialRoom room;
-  const Friction friction = friction_of(touch, material_there(touch, rest->point, room));
+  Friction friction = friction_of(touch, material_there(touch, rest->point, room));
   const bool rubs = friction.still > 0.0;
   bool sliding = rubs && state.sliding;
-  const bool held = rubs && holds(friction, state.proxy, plane.normal, probe, sliding);
+  const bool held = rubs && holds(friction, state.proxy, plane.push, probe, sliding);
   Vec3 proxy = state.proxy;
   if (!held) {
-    const Vec3 goal = rubs ? friction_goal(proxy, plane.normal, probe, friction.sliding) : probe;
-    const Vec3 to = onto_plane(goal, plane);
-    // A goal on the free side leads off the face.
-    if (to == goal || (rubs && !no_farther(to, proxy, probe))) return false;
-    const Segment motion{from, touch.to_local(to)};
-    if (!view.slides(motion, radius, sides)) return false;
-    plane = plane_of(*rest);
-    proxy = to;
-    if (rubs && !holds(friction, proxy, plane.normal, probe, sliding)) return false;
+    Vec3 goal = probe;
+    if (rubs) {
+      const Vec3 aim = friction_goal(proxy, plane.push, probe, friction.sliding);
+      const Vec3 still = proxy - (proxy - aim).dot(plane.push) * plane.push;
+      goal = still + (aim - still);
+    }
+    const Vec3 step = onto_plane(goal, plane.of) - proxy;
+    if (step.norm() > JointSolve::rest_on_triangles * view.skin()) {
+      const Vec3 to = proxy + step;
+      if (rubs && !no_farther(to, proxy, probe)) return false;
+      if (!view.slides({from, touch.to_local(to)}, radius, sides)) return false;
+      plane = FacePlane(touch, *rest, radius, view.skin(), probe);
+      proxy = to;
+    }
+    if (!(plane.pressed > 0.0)) return false;
+    if (rubs) {
+      friction = friction_of(touch, material_there(touch, rest->point, room));
+      if (!(friction.still > 0.0) || !holds(friction, proxy, plane.push, probe, sliding)) return false;
+    }
   }
-  const double pressed = plane.offset - plane.normal.dot(probe);
   state.proxy = proxy;
   state.sliding = sliding || (rubs && !held);
   const Material& material = material_there(touch, rest->point, room);
-  tick.felt = rubs ? proxy : Vec3(probe + pressed * plane.normal);
+  const Vec3 spring = plane.pressed * plane.of.normal;
+  const Vec3 led = probe + spring;
+  tick.felt = rubs ? proxy : led;
   Part& part = *tick.parts.emplace_back();
   part = {&touch, {}, material.stiffness};
   LawForce& law = part.law;
   law.contact = true;
-  law.penetration = pressed;
-  law.normal = plane.normal;
-  law.spring = law.force = material.stiffness * pressed * plane.normal;
+  law.penetration = spring.norm();
+  law.normal = spring / law.penetration;
+  law.spring = law.force = material.stiffness * spring;
   finish_by_law(touch, *rest, law);
-  if (rubs) {
-    const Vec3 along = material.stiffness * (proxy - pressed * plane.normal - probe);
-    law.force += along;
-    law.spring += along;
-  }
+  const Vec3 goal = rubs ? Vec3(proxy - (led - probe)) : probe;
+  const Vec3 along = material.stiffness * (goal - probe);
+  law.force += along;
+  law.spring += along;
   law.force = with_damping(law.force, law.normal, tick.probe->twist.linear, material.damping);
   law.point = touch.to_world(rest->point);
   law.element = rest->element;
   OfSurface& surface = touch.contact->surface;
   const Vec3 face = view.surface().mesh().face_normal(rest->element);
+  surface.normal = touch.turned_back(plane.of.normal);
   surface.places.clear();
-  surface.places.push_back({rest->element, rest->normal.dot(face) < 0.0, rest->at});
+  surface.places.push_back({rest->element, surface.normal.dot(face) < 0.0, rest->at});
   surface.height = face.dot(touch.to_local(proxy) - rest->point);
-  surface.normal = rest->normal;
   surface.rests = false;
   surface.sliding = state.sliding;
   return true;
