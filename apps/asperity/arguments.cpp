@@ -1,6 +1,7 @@
 #include "apps/asperity/arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <utility>
 
 #include "apps/asperity/command.h"
@@ -28,7 +29,11 @@ Argument Argument::shows_default() {
 }
 
 Argument Argument::between(double least, double most) {
-  return Argument(option_->check(CLI::Range(least, most)));
+  // Nan is below and above nothing, so a check of the ends alone would let it in.
+  return Argument(option_->check(CLI::Range(least, most))->check([](const std::string& text) {
+    double value = 0.0;
+    return CLI::detail::lexical_cast(text, value) && std::isnan(value) ? text + " is not a number" : std::string();
+  }));
 }
 
 Argument Argument::between(int least, int most) {

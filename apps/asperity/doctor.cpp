@@ -8,16 +8,13 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <thread>
 
 #include "apps/asperity/command.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
 #include "asperity/render/step.h"
-#include "asperity/servo/realtime.h"
-#include "asperity/servo/session.h"
-#include "asperity/servo/warm_memory.h"
+#include "asperity/servo/servo_thread.h"
 
 namespace asperity::program {
 namespace {
@@ -61,15 +58,20 @@ System look_at_system() {
   return system;
 }
 
+/// What the loop has to do.
+struct Load {
+  const Experiment* experiment = nullptr;  ///< nullptr: nothing
+};
+
 /// Reads the probes of a run again and again; without any it stands still.
 struct PlayedProbe {
-  const std::vector<TraceRecord>& records;
+  const std::vector<TraceRecord>* records;
   std::size_t next = 0;
 
   ProbeSample read() noexcept {
-    if (records.empty()) return {};
-    const ProbeSample probe = records[next].probe;
-    next = (next + 1) % records.size();
+    if (records->empty()) return {};
+    const ProbeSample probe = (*records)[next].probe;
+    next = (next + 1) % records->size();
     return probe;
   }
   void apply(const Vec3&, Seconds) noexcept {}
@@ -86,46 +88,46 @@ struct Part {
   TimeCounts step;
 };
 
-/// Runs a loop on a thread of its own while this one tells how far it is.
+/// Steps through a scene; without one there is nothing to touch.
+struct Touching {
+  ProxyState state = {};
+  ProxyCache cache = {};
+  double last = -infinity;  ///< s
+
+  ForceSample operator()(const Load& load, const ProbeSample& probe, Seconds dt) noexcept {
+    if (load.experiment == nullptr) return {};
+    // The stroke begins anew.
+    if (probe.time.count() < last) state = {};
+    last = probe.time.count();
+    return step(load.experiment->scene, state, cache, probe, dt);
+  }
+};
+
+struct NoRecord {
+  void operator()(const TraceRecord&) const noexcept {}
+};
+
+/// Runs a loop while this thread tells how far it is.
 Result<Part> examine(const std::string& name, const DoctorOptions& options, double rate, const Experiment* experiment,
                      const std::vector<TraceRecord>& records, const Progress& progress,
                      std::vector<RealtimeGrant>& grants) {
-  ASPERITY_TRY(PeriodicClock<> clock, PeriodicClock<>::build(rate));
-  ASPERITY_TRY(SafetyStage safety, SafetyStage::build({}));
-  SessionSettings settings;
+  ServoSettings settings;
+  settings.rate = rate;
+  settings.realtime = options.realtime;
   settings.max_ticks = static_cast<std::uint64_t>(rate * options.seconds);
-  LoopMeters meters;
-  SessionSummary summary;
-  std::optional<Error> refused;
-  std::atomic<bool> done = false;
-  std::thread loop([&] {
-    Result<std::vector<RealtimeGrant>> asked = become_realtime(options.realtime);
-    if (asked) {
-      grants = *asked;
-      warm_memory();
-      ProxyState state;
-      ProxyCache cache = experiment != nullptr ? ProxyCache(experiment->scene) : ProxyCache();
-      PlayedProbe device{records};
-      const auto step_once = [&](const ProbeSample& probe, Seconds dt) {
-        if (experiment == nullptr) return ForceSample{};
-        if (device.next == 1) state = {};
-        return step(experiment->scene, state, cache, probe, dt);
-      };
-      summary = run_loop(
-          clock, step_once, device, safety, settings, [](const TraceRecord&) {}, {}, &meters);
-    } else {
-      refused = asked.error();
-    }
-    done = true;
-  });
-  while (!done) {
+  Touching touching;
+  if (experiment != nullptr) touching.cache = ProxyCache(experiment->scene);
+  using Loop = ServoThread<Load, Touching, PlayedProbe, NoRecord>;
+  ASPERITY_TRY(const std::unique_ptr<Loop> loop, Loop::start(std::make_shared<const Load>(Load{experiment}),
+                                                             std::move(touching), PlayedProbe{&records}, {}, settings));
+  while (!loop->ended()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    const auto ticks = static_cast<double>(meters.lateness.counts().total);
+    const auto ticks = static_cast<double>(loop->meters().lateness.counts().total);
     if (progress) progress(name, std::min(1.0, ticks / static_cast<double>(settings.max_ticks)));
   }
-  loop.join();
-  if (refused) return *refused;
-  return Part{name, summary.ticks, summary.missed, meters.lateness.counts(), meters.step.counts()};
+  const SessionSummary summary = loop->stop();
+  grants = loop->grants();
+  return Part{name, summary.ticks, summary.missed, loop->meters().lateness.counts(), loop->meters().step.counts()};
 }
 
 enum class Verdict { fit, late, unfit };
@@ -215,7 +217,6 @@ Result<int> doctor(const DoctorOptions& options, const Console& console) {
   const Progress progress = console.progress();
   ASPERITY_TRY(const Experiment experiment, load_scene(options.scene, progress));
   ASPERITY_TRY(const RunResult run, run_experiment(experiment, {}, progress));
-  if (run.records.empty()) return bad_value("has no ticks", "stroke", "a stroke that takes time");
   const System system = look_at_system();
   const double rate = experiment.rate;
   std::vector<RealtimeGrant> grants;

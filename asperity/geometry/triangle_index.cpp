@@ -16,7 +16,8 @@ constexpr double crowded_motion_in_edges = 0.5;
 constexpr double patch_slack_in_edges = 1.0;
 // The first part of a longer motion that is looked at by itself.
 constexpr double first_look_in_edges = 0.25;
-// A ball that slides along a face looks so many times its motion around, an edge at most.
+// A ball that slides along a face looks so many times its motion around, an edge at most; but only where it would stay
+// on the face for so many more.
 constexpr double look_in_motions = 8.0;
 constexpr double least_slides = 3.0;
 
@@ -151,8 +152,7 @@ void TriangleIndex::look_beside(const Vec3& position, const Foot& rest, double r
   const double margin = error(position);
   const bool rested = patch.rested;
   scan_ball(position, reach, patch, [&](std::uint32_t face, double distance, const Vec3&) {
-    if (face == rest.element) return;
-    if (below(face, rest)) return;
+    if (face == rest.element || below(face, rest)) return;
     TrianglePatch::Beside::One one{face, distance - margin};
     if (beside.listed.push_back(one)) return;
     for (TrianglePatch::Beside::One& other : beside.listed) {

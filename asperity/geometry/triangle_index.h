@@ -159,6 +159,7 @@ class TriangleIndex {
   /// Whether a ball that rests on a face keeps off all that is not below that on a short motion.
   [[nodiscard]] bool passes_others(const Segment& motion, const Foot& rest, double radius,
                                    TrianglePatch& patch) const noexcept;
+  /// Lists what a ball that rests on a face may come to within `reach` of where it is.
   void look_beside(const Vec3& position, const Foot& rest, double reach, TrianglePatch& patch) const noexcept;
   /// Whether nothing reaches into the ball on a short motion; if so, remembers what it touches at its end.
   bool glides(const Segment& motion, double length, double radius, Sides sides, double touch,

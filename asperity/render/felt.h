@@ -88,6 +88,30 @@ inline void finish_by_law(const Touched& touch, const Foot& foot, LawForce& answ
   if (law.kind().finish != nullptr) law.kind().finish(law.settings(), touch, foot, answer);
 }
 
+/// How a spring (m, from where the probe would be to the planes that hold it) pushes. [servo]
+inline LawForce pushed_by(const Vec3& spring, double stiffness) noexcept {
+  LawForce answer;
+  answer.contact = true;
+  answer.penetration = spring.norm();
+  answer.normal = spring / answer.penetration;
+  answer.force = stiffness * spring;
+  return answer;
+}
+
+/// What is felt of that: as the law and the material say, with what friction holds beside it (`along`: m, to the
+/// probe). [servo]
+inline void finish_push(const Touched& touch, const Material& material, const Foot& foot, const Vec3& along,
+                        const ProbeSample& probe, LawForce& answer) noexcept {
+  answer.spring = answer.force;
+  finish_by_law(touch, foot, answer);
+  const Vec3 friction = material.stiffness * along;
+  answer.force += friction;
+  answer.spring += friction;
+  answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
+  answer.point = touch.to_world(foot.point);
+  answer.element = foot.element;
+}
+
 /// The surface as the instance's law feels it, at its contact's threshold and level and a moment of its coat. [servo]
 inline FeltView felt_view(const Touched& touch) noexcept {
   SurfaceCache& cache = *touch.cache;

@@ -51,18 +51,18 @@ struct SteadyTime {
   }
 };
 
+/// Errors: bad_value ("rate": 500 Hz to 40 kHz). [build]
+Status check_loop_rate(double rate);
+
 /// Ticks at whole periods from its first one. A late tick is told and its dt is what it was; those that were due in
 /// the meantime are left out, never made up for in a burst: the next is due at the next whole period. A time that
 /// stands still or goes back gives a dt of 0, one that leaps ahead a dt that the loop sees as it is.
 template <class Time = SteadyTime>
 class PeriodicClock {
  public:
-  /// Errors: bad_value ("rate": 500 Hz to 40 kHz). [build]
+  /// Errors: of check_loop_rate. [build]
   static Result<PeriodicClock> build(double rate, Time time = {}) {
-    constexpr double lowest = 500.0;
-    constexpr double highest = 40e3;
-    if (!(rate >= lowest && rate <= highest))
-      return Error{ErrorCode::bad_value, "it is no rate that a loop runs at", "", "rate", "500 Hz to 40 kHz"};
+    ASPERITY_CHECK(check_loop_rate(rate));
     return PeriodicClock(static_cast<std::int64_t>(1e9 / rate + 0.5), time);
   }
 
@@ -74,6 +74,9 @@ class PeriodicClock {
       tick.dt = seconds(period_);
       return tick;
     }
+    // A clock that was set back would be waited for until it has caught up.
+    const std::int64_t before = time_.now();
+    if (due_ - before > 2 * period_) due_ = before + period_;
     time_.sleep_until(due_);
     const std::int64_t now = time_.now();
     const std::int64_t late = now > due_ ? now - due_ : 0;
@@ -82,8 +85,6 @@ class PeriodicClock {
     tick.dt = seconds(now > last_ ? now - last_ : 0);
     last_ = now;
     due_ += period_ * (late / period_ + 1);
-    // A clock that was set back would be waited for until it has caught up.
-    if (due_ - now > 2 * period_) due_ = now + period_;
     return tick;
   }
   [[nodiscard]] Seconds period() const noexcept { return seconds(period_); }

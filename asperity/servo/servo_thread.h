@@ -111,7 +111,7 @@ class ServoThread {
       record_(tick);
       return !(ends && tick.commanded.isZero());
     };
-    summary_ = run_loop(clock, step, endless, safety_, SessionSettings{.max_ticks = UINT64_MAX}, record, {}, &meters_);
+    summary_ = run_loop(clock, step, endless, safety_, LoopSettings{.max_ticks = UINT64_MAX}, record, {}, &meters_);
   }
 
   Step step_;

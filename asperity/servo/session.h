@@ -17,12 +17,18 @@
 
 namespace asperity {
 
-/// Period and length of a session.
-struct SessionSettings {
-  Seconds dt{0.001};                       ///< period of the loop, above 0
-  std::uint64_t max_ticks = 10'000'000;    ///< the session ends here, or earlier when the device has finished
+/// Length of a loop.
+struct LoopSettings {
+  std::uint64_t max_ticks = 10'000'000;    ///< the loop ends here, or earlier when the device has finished
   std::uint64_t progress_interval = 1000;  ///< ticks between two calls of the progress function, 1 or more
   std::uint64_t expected_ticks = 0;        ///< for the progress fraction only; 0: `max_ticks`
+};
+
+/// The same with the length of its ticks, where no clock tells it.
+struct SessionSettings : LoopSettings {
+  SessionSettings() = default;
+  SessionSettings(Seconds of, const LoopSettings& length = {}) : LoopSettings(length), dt(of) {}  // NOLINT: may convert
+  Seconds dt{0.001};                                                                              ///< above 0
 };
 
 /// What a session did, in brief.
@@ -74,13 +80,12 @@ void timed_step(Step& step, TraceRecord& tick) {
 /// apply.
 ///
 /// `step(const ProbeSample&, Seconds) -> ForceSample` is the renderer with its scene and state bound to it; it is
-/// timed. Each tick's dt is what the clock says has passed, not what `settings` would have it be. `record(const
-/// TraceRecord&)` gets every tick, before the force is applied; when it returns bool, false stops
-/// the session. The recorded flags are those of `step` and of the safety stage together. The loop itself does not
-/// allocate; neither does a session as long as `step`, `record` and `progress` do not. `meters`: may be nullptr.
-/// [servo]
+/// timed. Each tick's dt is what the clock says has passed. `record(const TraceRecord&)` gets every tick, before the
+/// force is applied; when it returns bool, false stops the session. The recorded flags are those of `step` and of the
+/// safety stage together. The loop itself does not allocate; neither does a session as long as `step`, `record` and
+/// `progress` do not. `meters`: may be nullptr. [servo]
 template <LoopClock Clock, class Step, Device D, class Record>
-SessionSummary run_loop(Clock& clock, Step&& step, D& device, SafetyStage& safety, const SessionSettings& settings,
+SessionSummary run_loop(Clock& clock, Step&& step, D& device, SafetyStage& safety, const LoopSettings& settings,
                         Record&& record, const Progress& progress = {}, LoopMeters* meters = nullptr) {
   SessionSummary summary;
   const std::uint64_t expected = settings.expected_ticks > 0 ? settings.expected_ticks : settings.max_ticks;

@@ -14,7 +14,7 @@ namespace asperity {
 struct TimeCounts {
   static constexpr unsigned parts_bits = 5;  ///< of each octave: 32 parts, so that a time is told to 3 %
   static constexpr unsigned octaves = 36;    ///< up to 2^40 ns, a quarter of an hour
-  static constexpr std::size_t buckets = (octaves + 1) << parts_bits;
+  static constexpr std::size_t buckets = octaves << parts_bits;
 
   std::array<std::uint64_t, buckets> counts{};
   std::uint64_t total = 0;

@@ -44,6 +44,14 @@ std::vector<TriangleMesh> meshes() {
   return all;
 }
 
+/// The same, a rough one of many triangles and a flat sheet.
+std::vector<TriangleMesh> meshes_and_sheet() {
+  std::vector<TriangleMesh> all = meshes();
+  all.push_back(TriangleMesh::build(random_closed_mesh(9, 4, 0.05, 0.5)).value());
+  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  return all;
+}
+
 TEST(Bvh, ClosestEqualsBruteForceOnEveryKindOfMesh) {
   Rng rng(1);
   for (const TriangleMesh& mesh : meshes()) {
@@ -397,9 +405,7 @@ std::string told(const SweptHit& hit) {
 // every edge and corner, the choice between them must not follow the order in which a patch lists them.
 TEST(TriangleIndex, NoAnswerDependsOnWhatAPatchHolds) {
   Rng rng(11);
-  std::vector<TriangleMesh> all = meshes();
-  all.push_back(TriangleMesh::build(random_closed_mesh(9, 4, 0.05, 0.5)).value());
-  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  const std::vector<TriangleMesh> all = meshes_and_sheet();
   int hits = 0;
   int several = 0;
   for (std::size_t which = 0; which < 2 * all.size(); ++which) {
@@ -458,9 +464,7 @@ Vec3 resting_over(Rng& rng, const TriangleMesh& mesh, double radius, double skin
 // A ball that stays on one face is not searched for: what else it may touch is listed and left behind in time.
 TEST(TriangleIndex, ABallThatSlidesAlongAFaceAnswersAsSearchesDo) {
   Rng rng(71);
-  std::vector<TriangleMesh> all = meshes();
-  all.push_back(TriangleMesh::build(random_closed_mesh(9, 4, 0.05, 0.5)).value());
-  all.push_back(TriangleMesh::build(plane_grid(0.1, 0.1, 12, 12)).value());
+  const std::vector<TriangleMesh> all = meshes_and_sheet();
   int slid = 0;
   int stopped = 0;
   int listed = 0;

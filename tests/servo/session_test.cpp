@@ -67,7 +67,7 @@ std::vector<TraceRecord> run_simulated(Seconds dt) {
       SimulatedDevice::build(line(PressMode::force), find_profile("omega.3").value(), HandImpedance{}).value();
   SafetyStage safety = wide_stage();
   std::vector<TraceRecord> records;
-  run_session(wall, device, safety, {.dt = dt}, [&](const TraceRecord& r) { records.push_back(r); });
+  run_session(wall, device, safety, dt, [&](const TraceRecord& r) { records.push_back(r); });
   return records;
 }
 
@@ -77,7 +77,7 @@ TEST(Session, RecordsEveryTickWithInputOutputAndHand) {
   SafetyStage safety = wide_stage();
   std::vector<TraceRecord> records;
   const SessionSummary summary =
-      run_session(wall, probe, safety, {.dt = Seconds(1e-3)}, [&](const TraceRecord& r) { records.push_back(r); });
+      run_session(wall, probe, safety, Seconds(1e-3), [&](const TraceRecord& r) { records.push_back(r); });
   ASSERT_EQ(summary.ticks, records.size());
   EXPECT_NEAR(static_cast<double>(summary.ticks), static_cast<double>(session_ticks(path.duration(), Seconds(1e-3))),
               1.0);
@@ -111,7 +111,7 @@ TEST(Session, ReplayOfTheProbeGivesTheSameForces) {
   ReplayDevice device = ReplayDevice::build(samples).value();
   SafetyStage safety = wide_stage();
   std::size_t i = 0;
-  run_session(wall, device, safety, {.dt = Seconds(1e-3)}, [&](const TraceRecord& r) {
+  run_session(wall, device, safety, Seconds(1e-3), [&](const TraceRecord& r) {
     EXPECT_EQ(r.commanded, first[i].commanded) << i;
     ++i;
   });
@@ -139,7 +139,7 @@ TEST(Session, SafetyStandsBetweenStepAndDevice) {
   };
   bool limited = false;
   bool replaced = false;
-  run_session(broken, probe, safety, {.dt = Seconds(1e-3)}, [&](const TraceRecord& r) {
+  run_session(broken, probe, safety, Seconds(1e-3), [&](const TraceRecord& r) {
     ASSERT_TRUE(r.commanded.allFinite());
     ASSERT_LE(r.commanded.norm(), 0.3);
     limited |= r.rendered.flags.has(TickFlag::force_limited);
@@ -153,7 +153,7 @@ TEST(Session, RecorderCanStopIt) {
   IdealProbe probe = IdealProbe::build(line(PressMode::depth)).value();
   SafetyStage safety = wide_stage();
   const SessionSummary summary =
-      run_session(wall, probe, safety, {.dt = Seconds(1e-3)}, [](const TraceRecord& r) { return r.tick < 9; });
+      run_session(wall, probe, safety, Seconds(1e-3), [](const TraceRecord& r) { return r.tick < 9; });
   EXPECT_TRUE(summary.stopped);
   EXPECT_EQ(summary.ticks, 10U);
 }
@@ -163,7 +163,7 @@ TEST(Session, EndsAtItsTickLimitAndShowsProgress) {
   SafetyStage safety = wide_stage();
   std::vector<double> fractions;
   const SessionSummary summary = run_session(
-      wall, probe, safety, {.dt = Seconds(1e-4), .max_ticks = 500, .progress_interval = 100}, [](const TraceRecord&) {},
+      wall, probe, safety, {Seconds(1e-4), {.max_ticks = 500, .progress_interval = 100}}, [](const TraceRecord&) {},
       [&](std::string_view, double fraction) { fractions.push_back(fraction); });
   EXPECT_EQ(summary.ticks, 500U);
   EXPECT_EQ(fractions, (std::vector<double>{0.2, 0.4, 0.6, 0.8, 1.0, 1.0}));
@@ -176,7 +176,8 @@ TEST(Session, TheLoopDoesNotAllocate) {
   SafetyStage safety = wide_stage();
   std::vector<TraceRecord> storage(3000);
   const auto record = [&](const TraceRecord& r) { storage[r.tick] = r; };
-  const SessionSettings settings{.dt = Seconds(1e-3), .max_ticks = storage.size()};
+  SessionSettings settings;
+  settings.max_ticks = storage.size();
   allocations = 0;
   counting = true;
   run_session(wall, simulated, safety, settings, record);

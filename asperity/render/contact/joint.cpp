@@ -55,7 +55,6 @@ bool JointSolve::complete() const noexcept {
   return all;
 }
 
-/// Whether a ball rests on an edge or corner of a mesh.
 bool JointSolve::rolls(const ConstraintPlane& plane) const noexcept {
   return radius_ > 0.0 && entries_[plane.owner].patch == nullptr && plane.contact.at.minCoeff() <= 0.0;
 }
@@ -341,6 +340,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   // larger steps.
   constexpr int most_moves = 64;
   constexpr int patience = 8;
+  constexpr int most_passed = 3;  // moves that may end where nothing is touched any more
   constexpr double least_gain = 1e-6;
   PlaneSet earlier;
   PlaneSet& planes = solution.planes;
@@ -366,7 +366,8 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     touched(solution.proxy, planes);
     const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
     Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
-    if (planes.empty() && move > 0 && move < 4 && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
+    const bool passed = planes.empty() && move > 0 && move <= most_passed;
+    if (passed && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
     const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
     if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target);
     Vec3 step = target - solution.proxy;
@@ -529,10 +530,9 @@ void JointSolve::remember_places(std::size_t index, const ConstraintSolution& so
       place.back =
           on_smooth_view(touch.view, [&](const auto& view) { return normal.dot(view.front(plane.contact)) < 0.0; });
     } else if (entry.patch == nullptr) {
-      const TriangleMesh& mesh = std::get_if<TriangleView>(&touch.view)->surface().mesh();
-      const Vec3 face = mesh.face_normal(place.element);
-      place.back = normal.dot(face) < 0.0;
-      if (active.multiplier > strongest) state.height = face.dot(touch.to_local(solution.proxy) - plane.contact.point);
+      const OnFace on(touch, plane.contact, normal, solution.proxy);
+      place = on.place;
+      if (active.multiplier > strongest) state.height = on.height;
     }
     state.places.push_back(place);
     if (!(active.multiplier > strongest)) continue;
@@ -556,9 +556,8 @@ const ConstraintPlane* strongest_plane(std::size_t owner, const ConstraintSoluti
 
 LawForce owner_force(const Touched& touch, const Material& material, std::size_t owner,
                      const ConstraintSolution& solution, const Vec3& goal, const ProbeSample& probe) noexcept {
-  LawForce answer;
   const ConstraintPlane* plane = strongest_plane(owner, solution);
-  if (plane == nullptr) return answer;
+  if (plane == nullptr) return {};
   Vec3 spring = Vec3::Zero();
   double strongest = 0.0;
   double strongest_of_all = 0.0;
@@ -568,27 +567,17 @@ LawForce owner_force(const Touched& touch, const Material& material, std::size_t
     spring += active.multiplier * solution.planes[active.plane].normal;
     strongest = std::max(strongest, active.multiplier);
   }
-  answer.contact = true;
-  answer.penetration = spring.norm();
-  answer.normal = spring / answer.penetration;
-  answer.force = material.stiffness * spring;
+  LawForce answer = pushed_by(spring, material.stiffness);
+  const bool leads = strongest == strongest_of_all;
   // Not at rest yet: the spring runs to where the proxy really is.
-  if (!solution.settled() && strongest == strongest_of_all) {
+  if (!solution.settled() && leads) {
     Vec3 rest = solution.proxy - goal;
     for (const PlaneProjection::Active& active : solution.projection.active)
       rest -= active.multiplier * solution.planes[active.plane].normal;
     answer.force += material.stiffness * rest;
   }
-  answer.spring = answer.force;
-  finish_by_law(touch, plane->contact, answer);
-  if (strongest == strongest_of_all) {
-    const Vec3 friction = material.stiffness * (goal - probe.pose.position);
-    answer.force += friction;
-    answer.spring += friction;
-  }
-  answer.force = with_damping(answer.force, answer.normal, probe.twist.linear, material.damping);
-  answer.point = touch.to_world(plane->contact.point);
-  answer.element = plane->contact.element;
+  const Vec3 along = leads ? Vec3(goal - probe.pose.position) : Vec3(Vec3::Zero());
+  finish_push(touch, material, plane->contact, along, probe, answer);
   return answer;
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <span>
 
-#include "asperity/render/contact/coulomb.h"
 #include "asperity/render/contact/generated_geometry.h"
 #include "asperity/render/contact/planes.h"
 #include "asperity/render/felt.h"
@@ -32,7 +31,8 @@ class JointSolve {
   /// Not converged where they do not hold it there, or are not known to be all; `solve` is to be asked then. [servo]
   [[nodiscard]] ConstraintSolution on_border(const Place& place, const Vec3& goal) const noexcept;
   /// The same as `solve` with the friction of the plane that pushes most: each round leads the proxy to the probe as
-  /// far as the cone lets it go. `goal` becomes where a proxy without friction would have been led. [servo]
+  /// far as the cone lets it go (joint_friction.h). `goal` becomes where a proxy without friction would have been led.
+  /// [servo]
   template <class FrictionOf>
   ConstraintSolution solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
                                          const FrictionOf& friction_of) noexcept;
@@ -134,6 +134,7 @@ class JointSolve {
   void settle_point(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void remember_held(std::size_t index, const ConstraintSolution& solution) noexcept;
   void explain(const Vec3& goal, ConstraintSolution& solution) noexcept;
+
   /// Whether all that a ball may rest on there is known: told at once, or followed from one look to the next.
   [[nodiscard]] bool knows_feet(const Entry& entry) const noexcept;
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
@@ -174,6 +175,7 @@ class JointSolve {
   void remember(const ConstraintPlane& plane) noexcept;
   [[nodiscard]] double distance_to_foot(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] bool loosen(const Vec3& position) noexcept;
+  /// Whether a ball rests on an edge or corner of a mesh.
   [[nodiscard]] bool rolls(const ConstraintPlane& plane) const noexcept;
   [[nodiscard]] Vec3 edge_of(const ConstraintPlane& plane) const noexcept;
 
@@ -203,91 +205,18 @@ class JointSolve {
   double tolerance_ = infinity;  ///< below which a further move is not worth making (m)
 };
 
-/// The coefficients and the normal that friction on several planes goes by: those of the one that pushes most.
-struct Hold {
-  Friction friction;
-  Vec3 normal = Vec3::Zero();
+/// Where a contact is on a mesh, and how far the proxy is over its face.
+struct OnFace {
+  /// `normal`: away from the face, on the proxy's side (object frame); `proxy`: world frame. [servo]
+  OnFace(const Touched& touch, const Foot& foot, const Vec3& normal, const Vec3& proxy) noexcept
+      : place{foot.element, false, foot.at} {
+    const Vec3 face = std::get_if<TriangleView>(&touch.view)->surface().mesh().face_normal(foot.element);
+    place.back = normal.dot(face) < 0.0;
+    height = face.dot(touch.to_local(proxy) - foot.point);
+  }
+  Place place;
+  double height = 0.0;  ///< m, along the face's own normal
 };
-/// [servo]
-template <class FrictionOf>
-Hold strongest_hold(const PlaneSet& planes, const Vec3& goal, const FrictionOf& friction_of) noexcept {
-  const PlaneProjection projection = project_onto_planes(goal, planes, false);
-  Hold hold;
-  double strongest = 0.0;
-  for (const PlaneProjection::Active& active : projection.active) {
-    if (active.multiplier <= strongest) continue;
-    strongest = active.multiplier;
-    hold.friction = friction_of(planes[active.plane]);
-  }
-  const Vec3 push = projection.point - goal;
-  const double length = push.norm();
-  if (length > 0.0) hold.normal = push / length;
-  return hold;
-}
-
-template <class FrictionOf>
-ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3& probe, bool& sliding, Vec3& goal,
-                                                   const FrictionOf& friction_of) noexcept {
-  constexpr int most_rounds = 4;
-  constexpr int most_parts = 3;
-  ConstraintSolution solution;
-  Vec3 proxy = from;
-  PlaneSet planes;
-  rests_on(proxy, planes);
-  bool slid = false;
-  bool landed = false;
-  for (int round = 0; round < most_rounds; ++round) {
-    const Hold hold = strongest_hold(planes, probe, friction_of);
-    if (hold.friction.still <= 0.0 || hold.normal.isZero()) {
-      // In free space, or without friction, the proxy goes all the way; what it meets then decides.
-      goal = probe;
-      solution = solve(proxy, goal);
-      const bool met = planes.empty() && !solution.planes.empty() && round == 0 &&
-                       strongest_hold(solution.planes, probe, friction_of).friction.still > 0.0;
-      if (!met) {
-        sliding = false;
-        return solution;
-      }
-      // It met something with friction: it would have stopped there, not slid on for nothing.
-      planes = solution.planes;
-      proxy = solution.proxy;
-      landed = true;
-      continue;
-    }
-    bool slipped = !holds(hold.friction, proxy, hold.normal, probe, sliding);
-    if (slipped) {
-      const Vec3 aim = friction_goal(proxy, hold.normal, probe, hold.friction.sliding);
-      // On a bent surface the cone turns on the way: where all of it leads away from the probe, a part of it may not.
-      const Vec3 still = proxy - (proxy - aim).dot(hold.normal) * hold.normal;
-      const HeldSet held = held_;
-      double share = 1.0;
-      slipped = false;
-      for (int part = 0; part < most_parts && !slipped && !work_.spent(); ++part, share *= 0.25) {
-        goal = still + share * (aim - still);
-        solution = solve(proxy, goal);
-        slipped = no_farther(solution.proxy, proxy, probe);
-        if (!slipped) held_ = held;
-      }
-    }
-    if (!slipped) {
-      sliding = sliding || (slid && !landed);
-      // The spring's force is its own, whatever its direction: what the planes hold is the push, the rest is
-      // friction's.
-      solution = {};
-      solution.proxy = proxy;
-      solution.planes = planes;
-      solution.converged = true;
-      solution.projection = project_onto_planes(probe, planes, false);
-      goal = proxy - (solution.projection.point - probe);
-      solution.projection.point = proxy;
-      return solution;
-    }
-    slid = true;
-    proxy = solution.proxy;
-    planes = solution.planes;
-  }
-  return solution;
-}
 
 /// The plane of one owner that pushes most; nullptr: none does. [servo]
 const ConstraintPlane* strongest_plane(std::size_t owner, const ConstraintSolution& solution) noexcept;

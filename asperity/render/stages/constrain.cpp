@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "asperity/render/contact/fine.h"
-#include "asperity/render/contact/joint.h"
+#include "asperity/render/contact/joint_friction.h"
 #include "asperity/render/contact/level.h"
 #include "asperity/render/contact/point_folds.h"
 #include "asperity/render/local_material.h"
@@ -200,12 +200,13 @@ struct FacePlane {
     of.offset = of.normal.dot(touch.to_world(foot.point)) + radius;
     of.skin = skin;
     pressed = of.offset - of.normal.dot(probe);
+    // As strongest_hold gets it from two places, to the bit.
     push = (probe + pressed * of.normal) - probe;
     push /= push.norm();
   }
   ConstraintPlane of;
   double pressed = 0.0;      ///< m; not above 0: the probe is on the free side
-  Vec3 push = Vec3::Zero();  ///< the way to the plane, unit; as it is got from two places
+  Vec3 push = Vec3::Zero();  ///< the way to the plane, unit
 };
 
 /// A ball that rests on one face of a mesh, and slides along it to nothing else: to the bit what the joint solve makes
@@ -230,12 +231,7 @@ bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
   const bool held = rubs && holds(friction, state.proxy, plane.push, probe, sliding);
   Vec3 proxy = state.proxy;
   if (!held) {
-    Vec3 goal = probe;
-    if (rubs) {
-      const Vec3 aim = friction_goal(proxy, plane.push, probe, friction.sliding);
-      const Vec3 still = proxy - (proxy - aim).dot(plane.push) * plane.push;
-      goal = still + (aim - still);
-    }
+    const Vec3 goal = rubs ? Slip(proxy, plane.push, probe, friction.sliding).goal(1.0) : probe;
     const Vec3 step = onto_plane(goal, plane.of) - proxy;
     if (step.norm() > JointSolve::rest_on_triangles * view.skin()) {
       const Vec3 to = proxy + step;
@@ -258,25 +254,15 @@ bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
   tick.felt = rubs ? proxy : led;
   Part& part = *tick.parts.emplace_back();
   part = {&touch, {}, material.stiffness};
-  LawForce& law = part.law;
-  law.contact = true;
-  law.penetration = spring.norm();
-  law.normal = spring / law.penetration;
-  law.spring = law.force = material.stiffness * spring;
-  finish_by_law(touch, *rest, law);
+  part.law = pushed_by(spring, material.stiffness);
   const Vec3 goal = rubs ? Vec3(proxy - (led - probe)) : probe;
-  const Vec3 along = material.stiffness * (goal - probe);
-  law.force += along;
-  law.spring += along;
-  law.force = with_damping(law.force, law.normal, tick.probe->twist.linear, material.damping);
-  law.point = touch.to_world(rest->point);
-  law.element = rest->element;
+  finish_push(touch, material, *rest, goal - probe, *tick.probe, part.law);
   OfSurface& surface = touch.contact->surface;
-  const Vec3 face = view.surface().mesh().face_normal(rest->element);
   surface.normal = touch.turned_back(plane.of.normal);
+  const OnFace on(touch, *rest, surface.normal, proxy);
   surface.places.clear();
-  surface.places.push_back({rest->element, surface.normal.dot(face) < 0.0, rest->at});
-  surface.height = face.dot(touch.to_local(proxy) - rest->point);
+  surface.places.push_back(on.place);
+  surface.height = on.height;
   surface.rests = false;
   surface.sliding = state.sliding;
   return true;
@@ -328,11 +314,8 @@ void constrain(Tick& tick) noexcept {
   const Vec3 before = tick.state.proxy;
   if (alone) tick.state.sliding = last->contact->surface.sliding;
   Place border;
-  if (count == 1 && tick.scene.probe_radius() > 0.0 && !last->facts->smooth && !facets &&
-      constrain_on_face(*last, tick)) {
-    see_what_is_left(tick, before);
-    return;
-  }
+  const bool on_mesh = count == 1 && tick.scene.probe_radius() > 0.0 && !last->facts->smooth && !facets;
+  if (on_mesh && constrain_on_face(*last, tick)) return see_what_is_left(tick, before);
   if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick, border); })) {
     if (facets) {
       constrain_with_facets(tick);
