@@ -14,11 +14,9 @@ namespace asperity {
 /// Where the probe is, as the device side reports it. World frame, SI.
 struct ProbeSample {
   Pose pose = {};
-  Twist twist = {};  ///< estimated by the device side; its error is the estimator's to state
-  /// Bit i: button i of the device is pressed. Recorded in traces, set and read by nothing yet: it stays 0 until
-  /// devices report it.
-  std::uint32_t buttons = 0;
-  Seconds time{0.0};  ///< since the start of the run
+  Twist twist = {};           ///< estimated by the device side; its error is the estimator's to state
+  std::uint32_t buttons = 0;  ///< bit i: button i of the device is pressed
+  Seconds time{0.0};          ///< since the start of the run
 };
 
 /// Status of one tick. Bits, because several can hold at once.
@@ -39,6 +37,10 @@ enum class TickFlag : std::uint32_t {
   field_force = 1u << 10,    ///< a volume without a surface pushes
   texture_faded = 1u << 11,  ///< a texture is finer than speed or device can render, and was felt weaker
   work_left = 1u << 12,      ///< the tick's budget was spent; the proxy goes on from where it is in the next tick
+  power_limited = 1u << 13,  ///< the safety stage limited what the force does to the hand per second
+  at_border = 1u << 14,      ///< near the end of the workspace: the safety stage limited the force that leads out
+  not_enabled = 1u << 15,    ///< the button that has to be held is not; force withheld
+  fault = 1u << 16,          ///< a fault of the loop or the device; force withheld
 };
 /// As in reports.
 template <>
@@ -55,7 +57,11 @@ struct Names<TickFlag> {
                                                                 {TickFlag::coarse_data, "coarse_data"},
                                                                 {TickFlag::field_force, "field_force"},
                                                                 {TickFlag::texture_faded, "texture_faded"},
-                                                                {TickFlag::work_left, "work_left"}});
+                                                                {TickFlag::work_left, "work_left"},
+                                                                {TickFlag::power_limited, "power_limited"},
+                                                                {TickFlag::at_border, "at_border"},
+                                                                {TickFlag::not_enabled, "not_enabled"},
+                                                                {TickFlag::fault, "fault"}});
 };
 
 /// A set of TickFlag.

@@ -18,13 +18,26 @@ namespace {
 //   slew        full force within 2 ms, a usual electrical time constant of motor and amplifier, rounded up: it stops
 //               kicks, and leaves what a texture asks for (some 100 N/s) alone
 //   rate        1 kHz, the field's usual loop
+//   power       full force on a hand that is carried along at 1 m/s: more is a device that runs away
+//   velocity    5 m/s: hands reach 2 to 3
 constexpr double full_force_time = 2e-3;
+constexpr double carried_along = 1.0;
 
 constexpr std::size_t profile_count = 15;
 
 DeviceProfile impedance(const char* name, double force, double stiffness, double damping, double radius,
                         double resolution, double mass, double own_damping, double friction) {
-  return {name, force, stiffness, damping, radius, resolution, mass, own_damping, friction, force / full_force_time};
+  return {name,
+          force,
+          stiffness,
+          damping,
+          radius,
+          resolution,
+          mass,
+          own_damping,
+          friction,
+          force / full_force_time,
+          force * carried_along};
 }
 
 // 250 N is the papers'; the radius is that of a sphere inside their 40 x 36 cm x 1 rad wedge (checklists H-dev). 2 kg
@@ -41,6 +54,8 @@ DeviceProfile hapticmaster() {
 DeviceProfile ideal() {
   DeviceProfile profile = impedance("ideal", 1000.0, 1e6, 1000.0, 0.1, 0.0, 0.0, 0.0, 0.0);
   profile.slew_limit = 1e9;
+  profile.max_power = 1e9;
+  profile.max_velocity = 1e6;
   return profile;
 }
 
@@ -91,6 +106,8 @@ Status validate_profile(const DeviceProfile& profile) {
   ASPERITY_CHECK(require(p.damping >= 0.0, "damping", p.damping, "a damping of 0 or more (N s/m)"));
   ASPERITY_CHECK(require(p.friction >= 0.0, "friction", p.friction, "a force of 0 or more (N)"));
   ASPERITY_CHECK(require(p.slew_limit > 0.0, "slew_limit", p.slew_limit, "a force rate above 0 (N/s)"));
+  ASPERITY_CHECK(require(p.max_power > 0.0, "max_power", p.max_power, "a power above 0 (W)"));
+  ASPERITY_CHECK(require(p.max_velocity > 0.0, "max_velocity", p.max_velocity, "a speed above 0 (m/s)"));
   return require(p.rate > 0.0 && p.rate <= 1e6, "rate", p.rate, "a rate above 0 and up to 1 MHz (Hz)");
 }
 

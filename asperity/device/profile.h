@@ -13,8 +13,8 @@ namespace asperity {
 /// A haptic device as far as rendering and simulation need it. SI; values at the tip, equal in all directions.
 ///
 /// In the built-in profiles force, stiffness, damping and workspace are the constants of CHAI3D 3.3's drivers;
-/// resolution, mass, viscous damping, friction, slew limit and rate are our own estimates unless `profile.cpp` names a
-/// source beside the number.
+/// resolution, mass, viscous damping, friction, slew limit, power, velocity and rate are our own estimates unless
+/// `profile.cpp` names a source beside the number.
 struct DeviceProfile {
   std::string name;                  ///< "omega.7"
   double max_force = 10.0;           ///< largest force that may be commanded (N), above 0
@@ -26,6 +26,8 @@ struct DeviceProfile {
   double damping = 0.0;        ///< the mechanism's own viscous damping (N·s/m), 0 or more
   double friction = 0.0;       ///< the mechanism's own Coulomb friction (N), 0 or more
   double slew_limit = 1000.0;  ///< largest change of the commanded force (N/s), above 0
+  double max_power = 10.0;     ///< most that the force may do to the hand per second (W), above 0
+  double max_velocity = 5.0;   ///< of the tip (m/s), above 0: what moves faster is no hand
   double rate = 1000.0;        ///< force updates a second (Hz), above 0
   bool admittance = false;     ///< measures force and moves a virtual mass; knows its velocity without an estimate
 };

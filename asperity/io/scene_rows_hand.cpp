@@ -98,6 +98,8 @@ void device(SceneObject& row) {
   own("damping", damping(not_negative), "The mechanism's own viscous damping.", &S::damping);
   own("friction", force(not_negative), "The mechanism's own Coulomb friction.", &S::friction);
   own("slew_limit", Type::number(positive), "Largest change of the commanded force in N/s.", &S::slew_limit);
+  own("max_power", Type::number(positive), "Most that the force may do to the hand in W.", &S::max_power);
+  own("max_velocity", speed(positive), "Of the tip: what moves faster is no hand.", &S::max_velocity);
   own("rate", frequency({0.0, 1e6, true}), "Force updates a second.", &S::rate);
   own("admittance", Type::boolean(), "Measures force and moves a virtual mass.", &S::admittance);
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -27,56 +28,173 @@ bool finite(const ProbeSample& probe) noexcept {
          probe.twist.linear.allFinite() && probe.twist.angular.allFinite() && std::isfinite(probe.time.count());
 }
 
-Status require_positive(double value, const char* place, const char* accepted) {
-  if (std::isfinite(value) && value > 0.0) return success();
+Status require(bool good, double value, const char* place, const char* accepted) {
+  if (good) return success();
   return bad_value(fmt::format("is {}", value), place, accepted);
+}
+Status require_positive(double value, const char* place, const char* accepted) {
+  return require(std::isfinite(value) && value > 0.0, value, place, accepted);
+}
+/// No limit is infinity.
+Status require_limit(double value, const char* place, const char* accepted) {
+  return require(value > 0.0, value, place, accepted);
+}
+
+bool is_time(Seconds dt) noexcept {
+  return std::isfinite(dt.count()) && dt.count() > 0.0;
 }
 
 }  // namespace
 
+std::string_view fault_sentence(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none: return "nothing is wrong";
+    case Fault::input_not_finite: return "the device reported a place or a speed that is not a number";
+    case Fault::output_not_finite: return "the renderer answered a force that is not a number";
+    case Fault::too_fast: return "the tip moved faster than a hand does: the device reports wrong places or runs away";
+    case Fault::overrun: return "a tick took longer than the loop may be blind";
+    case Fault::stalled: return "the renderer did not answer in time";
+    case Fault::device_lost: return "the device no longer answers";
+  }
+  return "";
+}
+
+SafetySettings SafetySettings::from_profile(const DeviceProfile& profile) {
+  SafetySettings settings;
+  settings.max_force = profile.max_force;
+  settings.slew_limit = profile.slew_limit;
+  settings.max_power = profile.max_power;
+  settings.max_velocity = profile.max_velocity;
+  return settings;
+}
+
+SafetySettings SafetySettings::for_hands(const DeviceProfile& profile, const Vec3& middle) {
+  SafetySettings settings = from_profile(profile);
+  settings.workspace = middle;
+  settings.workspace_radius = profile.workspace_radius;
+  settings.engage = Seconds(0.5);
+  settings.longest_tick = Seconds(0.05);
+  settings.latches = true;
+  return settings;
+}
+
 Result<SafetyStage> SafetyStage::build(const SafetySettings& settings) {
-  ASPERITY_CHECK(require_positive(settings.max_force, "max_force", "a force above 0 (N)"));
-  ASPERITY_CHECK(require_positive(settings.slew_limit, "slew_limit", "a force rate above 0 (N/s)"));
+  const SafetySettings& s = settings;
+  ASPERITY_CHECK(require_positive(s.max_force, "max_force", "a force above 0 (N)"));
+  ASPERITY_CHECK(require_positive(s.slew_limit, "slew_limit", "a force rate above 0 (N/s)"));
+  ASPERITY_CHECK(require_limit(s.max_power, "max_power", "a power above 0 (W)"));
+  ASPERITY_CHECK(require_limit(s.max_velocity, "max_velocity", "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(require_limit(s.workspace_radius, "workspace_radius", "a length above 0 (m)"));
+  ASPERITY_CHECK(require(s.workspace.allFinite(), s.workspace.sum(), "workspace", "a place (m)"));
+  ASPERITY_CHECK(require(s.border >= 0.0 && s.border <= 1.0, s.border, "border", "a share of the radius, 0 to 1"));
+  const double engage = s.engage.count();
+  ASPERITY_CHECK(require(std::isfinite(engage) && engage >= 0.0, engage, "engage", "a time of 0 or more (s)"));
+  ASPERITY_CHECK(require(s.enabling_button >= -1 && s.enabling_button < 32, s.enabling_button, "enabling_button",
+                         "a button, 0 to 31, or -1 for none"));
+  ASPERITY_CHECK(require_limit(s.longest_tick.count(), "longest_tick", "a time above 0 (s)"));
   return SafetyStage(settings);
+}
+
+/// What is wrong with this tick alone.
+Fault SafetyStage::seen(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) const noexcept {
+  if (!finite(probe)) return Fault::input_not_finite;
+  if (!rendered.wrench.force.allFinite()) return Fault::output_not_finite;
+  if (probe.twist.linear.norm() > settings_.max_velocity) return Fault::too_fast;
+  if (dt > settings_.longest_tick) return Fault::overrun;
+  return Fault::none;
 }
 
 SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) noexcept {
   Flags flags;
   const Vec3& force = rendered.wrench.force;
-  const bool input_good = finite(probe);
-  const bool output_good = force.allFinite();
-  flags.set(TickFlag::input_not_finite, !input_good);
-  flags.set(TickFlag::output_not_finite, !output_good);
-  const bool good = input_good && output_good;
+  const Fault now = seen(rendered, probe, dt);
+  if (!faulted()) fault_ = now;
+  flags.set(TickFlag::input_not_finite, !finite(probe));
+  flags.set(TickFlag::output_not_finite, !force.allFinite());
+  const bool has_own_flag = fault_ == Fault::input_not_finite || fault_ == Fault::output_not_finite;
+  flags.set(TickFlag::fault, faulted() || (fault_ != Fault::none && !has_own_flag));
+  const int button = settings_.enabling_button;
+  const bool enabled = button < 0 || (probe.buttons >> button & 1U) != 0;
+  flags.set(TickFlag::not_enabled, !enabled);
+  if (!enabled || faulted()) start_anew();
+  const bool good = now == Fault::none && fault_ == Fault::none && enabled;
   const bool said_inside = rendered.flags.has(TickFlag::started_inside);
   // A probe that begins in a volume is where it should be: the slew limit alone keeps its force from kicking.
   const bool field_alone = rendered.flags.has(TickFlag::field_force) && !rendered.flags.has(TickFlag::contact);
   if (!armed_ && good) armed_ = !said_inside && (force.isZero(0.0) || field_alone);
   flags.set(TickFlag::started_inside, !armed_);
-  return limit(good && armed_ ? force : Vec3(Vec3::Zero()), dt, flags);
+  if (armed_ && is_time(dt)) engaged_ += dt;
+
+  Vec3 target = good && armed_ ? force : Vec3(Vec3::Zero());
+  const double share = settings_.engage.count() > 0.0 ? std::min(1.0, engaged_ / settings_.engage) : 1.0;
+  flags.set(TickFlag::force_limited, shorten(target, share * settings_.max_force));
+  keep_inside(probe, target, flags);
+  keep_slew(target, dt, flags);
+  keep_inside(probe, last_, flags);
+  return {last_, flags};
 }
 
 SafetyOutput SafetyStage::ramp_down(Seconds dt) noexcept {
-  return limit(Vec3::Zero(), dt, Flags{});
+  Flags flags;
+  keep_slew(Vec3::Zero(), dt, flags);
+  return {last_, flags};
 }
 
 void SafetyStage::reset() noexcept {
   last_.setZero();
-  armed_ = false;
+  acknowledge();
+  start_anew();
 }
 
-SafetyOutput SafetyStage::limit(const Vec3& target, Seconds dt, Flags flags) noexcept {
-  Vec3 force = target;
-  flags.set(TickFlag::force_limited, shorten(force, settings_.max_force));
-  const double duration = std::isfinite(dt.count()) && dt.count() > 0.0 ? dt.count() : 0.0;
-  Vec3 change = force - last_;
-  if (shorten(change, settings_.slew_limit * duration)) {
-    flags.set(TickFlag::slew_limited);
-    force = last_ + change;
-    shorten(force, settings_.max_force);
+void SafetyStage::raise(Fault fault) noexcept {
+  if (fault == Fault::none || faulted()) return;
+  fault_ = fault;
+  raised_ = true;
+}
+
+void SafetyStage::acknowledge() noexcept {
+  if (faulted()) start_anew();
+  fault_ = Fault::none;
+  raised_ = false;
+}
+
+void SafetyStage::start_anew() noexcept {
+  armed_ = false;
+  engaged_ = Seconds(0.0);
+}
+
+/// Within the workspace and the power. Both make a force smaller, the second without turning it.
+void SafetyStage::keep_inside(const ProbeSample& probe, Vec3& force, Flags& flags) const noexcept {
+  if (!finite(probe)) return;
+  const Vec3 off = probe.pose.position - settings_.workspace;
+  const double away = off.norm();
+  const double radius = settings_.workspace_radius;
+  if (away > (1.0 - settings_.border) * radius) {
+    const Vec3 outward = off / away;
+    const double left = settings_.border > 0.0 ? std::max(0.0, (radius - away) / (settings_.border * radius)) : 0.0;
+    const double beyond = force.dot(outward) - left * settings_.max_force;
+    if (beyond > 0.0) {
+      force -= beyond * outward;
+      flags.set(TickFlag::at_border);
+    }
   }
-  last_ = force;
-  return {force, flags};
+  const double power = force.dot(probe.twist.linear);
+  if (power > settings_.max_power) {
+    force *= settings_.max_power * inside / power;
+    flags.set(TickFlag::power_limited);
+  }
+}
+
+/// From the last force towards another one as fast as it may.
+void SafetyStage::keep_slew(const Vec3& force, Seconds dt, Flags& flags) noexcept {
+  Vec3 next = force;
+  Vec3 change = force - last_;
+  if (shorten(change, settings_.slew_limit * (is_time(dt) ? dt.count() : 0.0))) {
+    flags.set(TickFlag::slew_limited);
+    next = last_ + change;
+    shorten(next, settings_.max_force);
+  }
+  last_ = next;
 }
 
 }  // namespace asperity

@@ -213,7 +213,8 @@ TEST(Flags, EveryBitHasItsName) {
   EXPECT_STREQ(flag_name(10), "field_force");
   EXPECT_STREQ(flag_name(11), "texture_faded");
   EXPECT_STREQ(flag_name(12), "work_left");
-  EXPECT_STREQ(flag_name(13), "unknown");
+  EXPECT_STREQ(flag_name(16), "fault");
+  EXPECT_STREQ(flag_name(17), "unknown");
 }
 
 // --- pictures ---
