@@ -28,16 +28,9 @@ bool finite(const ProbeSample& probe) noexcept {
          probe.twist.linear.allFinite() && probe.twist.angular.allFinite() && std::isfinite(probe.time.count());
 }
 
-Status require(bool good, double value, const char* place, const char* accepted) {
+Status require(bool good, const char* place, double value, const char* accepted) {
   if (good) return success();
   return bad_value(fmt::format("is {}", value), place, accepted);
-}
-Status require_positive(double value, const char* place, const char* accepted) {
-  return require(std::isfinite(value) && value > 0.0, value, place, accepted);
-}
-/// No limit is infinity.
-Status require_limit(double value, const char* place, const char* accepted) {
-  return require(value > 0.0, value, place, accepted);
 }
 
 bool is_time(Seconds dt) noexcept {
@@ -80,18 +73,24 @@ SafetySettings SafetySettings::for_hands(const DeviceProfile& profile, const Vec
 
 Result<SafetyStage> SafetyStage::build(const SafetySettings& settings) {
   const SafetySettings& s = settings;
-  ASPERITY_CHECK(require_positive(s.max_force, "max_force", "a force above 0 (N)"));
-  ASPERITY_CHECK(require_positive(s.slew_limit, "slew_limit", "a force rate above 0 (N/s)"));
-  ASPERITY_CHECK(require_limit(s.max_power, "max_power", "a power above 0 (W)"));
-  ASPERITY_CHECK(require_limit(s.max_velocity, "max_velocity", "a speed above 0 (m/s)"));
-  ASPERITY_CHECK(require_limit(s.workspace_radius, "workspace_radius", "a length above 0 (m)"));
-  ASPERITY_CHECK(require(s.workspace.allFinite(), s.workspace.sum(), "workspace", "a place (m)"));
-  ASPERITY_CHECK(require(s.border >= 0.0 && s.border <= 1.0, s.border, "border", "a share of the radius, 0 to 1"));
+  const auto positive = [](const char* place, double value, const char* accepted) {
+    return require(std::isfinite(value) && value > 0.0, place, value, accepted);
+  };
+  const auto limit = [](const char* place, double value, const char* accepted) {
+    return require(value > 0.0, place, value, accepted);  // infinity is no limit
+  };
+  ASPERITY_CHECK(positive("max_force", s.max_force, "a force above 0 (N)"));
+  ASPERITY_CHECK(positive("slew_limit", s.slew_limit, "a force rate above 0 (N/s)"));
+  ASPERITY_CHECK(limit("max_power", s.max_power, "a power above 0 (W)"));
+  ASPERITY_CHECK(limit("max_velocity", s.max_velocity, "a speed above 0 (m/s)"));
+  ASPERITY_CHECK(limit("workspace_radius", s.workspace_radius, "a length above 0 (m)"));
+  ASPERITY_CHECK(limit("longest_tick", s.longest_tick.count(), "a time above 0 (s)"));
+  ASPERITY_CHECK(require(s.workspace.allFinite(), "workspace", s.workspace.sum(), "a place (m)"));
+  ASPERITY_CHECK(require(s.border >= 0.0 && s.border <= 1.0, "border", s.border, "a share of the radius, 0 to 1"));
   const double engage = s.engage.count();
-  ASPERITY_CHECK(require(std::isfinite(engage) && engage >= 0.0, engage, "engage", "a time of 0 or more (s)"));
-  ASPERITY_CHECK(require(s.enabling_button >= -1 && s.enabling_button < 32, s.enabling_button, "enabling_button",
+  ASPERITY_CHECK(require(std::isfinite(engage) && engage >= 0.0, "engage", engage, "a time of 0 or more (s)"));
+  ASPERITY_CHECK(require(s.enabling_button >= -1 && s.enabling_button < 32, "enabling_button", s.enabling_button,
                          "a button, 0 to 31, or -1 for none"));
-  ASPERITY_CHECK(require_limit(s.longest_tick.count(), "longest_tick", "a time above 0 (s)"));
   return SafetyStage(settings);
 }
 
@@ -107,8 +106,7 @@ Fault SafetyStage::seen(const ForceSample& rendered, const ProbeSample& probe, S
 SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) noexcept {
   Flags flags;
   const Vec3& force = rendered.wrench.force;
-  const Fault now = seen(rendered, probe, dt);
-  if (!faulted()) fault_ = now;
+  if (!faulted()) fault_ = seen(rendered, probe, dt);
   flags.set(TickFlag::input_not_finite, !finite(probe));
   flags.set(TickFlag::output_not_finite, !force.allFinite());
   const bool has_own_flag = fault_ == Fault::input_not_finite || fault_ == Fault::output_not_finite;
@@ -117,7 +115,7 @@ SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& 
   const bool enabled = button < 0 || (probe.buttons >> button & 1U) != 0;
   flags.set(TickFlag::not_enabled, !enabled);
   if (!enabled || faulted()) start_anew();
-  const bool good = now == Fault::none && fault_ == Fault::none && enabled;
+  const bool good = fault_ == Fault::none && enabled;
   const bool said_inside = rendered.flags.has(TickFlag::started_inside);
   // A probe that begins in a volume is where it should be: the slew limit alone keeps its force from kicking.
   const bool field_alone = rendered.flags.has(TickFlag::field_force) && !rendered.flags.has(TickFlag::contact);
@@ -128,9 +126,8 @@ SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& 
   Vec3 target = good && armed_ ? force : Vec3(Vec3::Zero());
   const double share = settings_.engage.count() > 0.0 ? std::min(1.0, engaged_ / settings_.engage) : 1.0;
   flags.set(TickFlag::force_limited, shorten(target, share * settings_.max_force));
-  keep_inside(probe, target, flags);
   keep_slew(target, dt, flags);
-  keep_inside(probe, last_, flags);
+  keep_inside(probe, flags);
   return {last_, flags};
 }
 
@@ -163,24 +160,25 @@ void SafetyStage::start_anew() noexcept {
   engaged_ = Seconds(0.0);
 }
 
-/// Within the workspace and the power. Both make a force smaller, the second without turning it.
-void SafetyStage::keep_inside(const ProbeSample& probe, Vec3& force, Flags& flags) const noexcept {
+/// Cuts the force to the workspace and the power: both make it smaller, the second without turning it.
+void SafetyStage::keep_inside(const ProbeSample& probe, Flags& flags) noexcept {
   if (!finite(probe)) return;
   const Vec3 off = probe.pose.position - settings_.workspace;
-  const double away = off.norm();
+  const double away = off.stableNorm();
   const double radius = settings_.workspace_radius;
   if (away > (1.0 - settings_.border) * radius) {
     const Vec3 outward = off / away;
     const double left = settings_.border > 0.0 ? std::max(0.0, (radius - away) / (settings_.border * radius)) : 0.0;
-    const double beyond = force.dot(outward) - left * settings_.max_force;
+    const double beyond = last_.dot(outward) - left * settings_.max_force;
     if (beyond > 0.0) {
-      force -= beyond * outward;
+      last_ -= beyond * outward;
       flags.set(TickFlag::at_border);
     }
   }
-  const double power = force.dot(probe.twist.linear);
-  if (power > settings_.max_power) {
-    force *= settings_.max_power * inside / power;
+  // A sum that overflows is beyond the limit as well.
+  const double power = last_.dot(probe.twist.linear);
+  if (!(power <= settings_.max_power)) {
+    last_ *= std::isfinite(power) ? settings_.max_power * inside / power : 0.0;
     flags.set(TickFlag::power_limited);
   }
 }

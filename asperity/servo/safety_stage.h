@@ -1,12 +1,10 @@
 #pragma once
 // The last stage before any device: what no force may exceed, and when there is to be none.
 
-#include <array>
 #include <cstdint>
 #include <string_view>
 
 #include "asperity/core/math.h"
-#include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/samples.h"
 #include "asperity/device/profile.h"
@@ -22,16 +20,6 @@ enum class Fault : std::uint8_t {
   overrun,            ///< a tick took longer than the loop may be blind
   stalled,            ///< the renderer did not answer
   device_lost,        ///< the device no longer answers
-};
-template <>
-struct Names<Fault> {
-  static constexpr auto table = std::to_array<Named<Fault>>({{Fault::none, "none"},
-                                                             {Fault::input_not_finite, "input_not_finite"},
-                                                             {Fault::output_not_finite, "output_not_finite"},
-                                                             {Fault::too_fast, "too_fast"},
-                                                             {Fault::overrun, "overrun"},
-                                                             {Fault::stalled, "stalled"},
-                                                             {Fault::device_lost, "device_lost"}});
 };
 /// What has happened, in a sentence for whoever holds the device. [any]
 std::string_view fault_sentence(Fault fault) noexcept;
@@ -75,12 +63,13 @@ struct SafetyOutput {
 ///     that a volume alone pushes does: there is no inside to start from. After a latched fault, and while the button
 ///     is not held, it starts anew;
 ///  4. the magnitude is limited, direction kept (force_limited): for `engage` after it was let in to less;
-///  5. what leads out of the workspace is limited near its border and none beyond (at_border), what the force does to
-///     the hand per second as well, direction kept (power_limited);
-///  6. the change since the last tick is limited to slew_limit * dt (slew_limited). Targets of zero are reached by this
-///     ramp as well: a sudden drop is a kick too.
-/// For every sequence of inputs the output is finite, within 4 and 5, and changes by at most slew_limit * dt, unless 5
-/// allows no more: the force then becomes smaller at once.
+///  5. the change since the last tick is limited to slew_limit * dt (slew_limited). Targets of zero are reached by this
+///     ramp as well: a sudden drop is a kick too;
+///  6. what leads out of the workspace is cut near its border, and all of it beyond (at_border), and what the force
+///  does
+///     to the hand per second, direction kept (power_limited): at once, for both only make it smaller.
+/// For every sequence of inputs the output is finite, at most `max_force`, within 6, and but for 6 changes by at most
+/// slew_limit * dt.
 /// Limiting the magnitude is passive, limiting the slew is not (formulation.md, amendment 6): an energy observer
 /// belongs after this stage.
 class SafetyStage {
@@ -115,7 +104,7 @@ class SafetyStage {
   [[nodiscard]] bool faulted() const noexcept { return fault_ != Fault::none && (settings_.latches || raised_); }
   [[nodiscard]] Fault seen(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) const noexcept;
   void start_anew() noexcept;
-  void keep_inside(const ProbeSample& probe, Vec3& force, Flags& flags) const noexcept;
+  void keep_inside(const ProbeSample& probe, Flags& flags) noexcept;
   void keep_slew(const Vec3& force, Seconds dt, Flags& flags) noexcept;
 
   SafetySettings settings_;

@@ -363,6 +363,19 @@ TEST(SafetyStage, WithoutLatchesAFaultIsOverWithWhatCausedIt) {
   }
 }
 
+TEST(SafetyStage, PlacesAndSpeedsTooLargeToMultiplyAreBeyondTheLimits) {
+  SafetySettings settings{.max_force = 4.0, .slew_limit = 1e9};
+  settings.workspace_radius = 0.1;
+  settings.max_power = 2.0;
+  SafetyStage s = SafetyStage::build(settings).value();
+  s.apply(force(Vec3::Zero()), {}, Seconds(1e-3));
+  EXPECT_EQ(s.apply(force(Vec3(3, 0, 0)), probe_at(Vec3(1e300, 0, 0)), Seconds(1e-3)).force, Vec3(Vec3::Zero()));
+  EXPECT_EQ(s.apply(force(Vec3(3, 0, 0)), probe_at(Vec3::Zero(), Vec3(largest, 0, 0)), Seconds(1e-3)).force,
+            Vec3(Vec3::Zero()));
+  EXPECT_EQ(s.apply(force(Vec3(3, 3, 0)), probe_at(Vec3::Zero(), Vec3(largest, -largest, 0)), Seconds(1e-3)).force,
+            Vec3(Vec3::Zero()));
+}
+
 TEST(SafetyStage, NoForceWithoutTheButtonAndAFreeTickAfterEachLetGo) {
   SafetySettings settings = SafetySettings::for_hands(find_profile("touch").value());
   settings.enabling_button = 0;
@@ -400,7 +413,9 @@ TEST(SafetyStage, RefusesEveryOtherSettingThatIsNone) {
   }
   for (const double bad : {-0.1, infinity, nan}) {
     EXPECT_EQ(place([&](SafetySettings& s) { s.engage = Seconds(bad); }), "engage");
-    EXPECT_EQ(place([&](SafetySettings& s) { s.workspace.y() = bad == -0.1 ? nan : bad; }), "workspace");
+  }
+  for (const double bad : {infinity, nan}) {
+    EXPECT_EQ(place([&](SafetySettings& s) { s.workspace.y() = bad; }), "workspace");
   }
   for (const int bad : {-2, 32})
     EXPECT_EQ(place([&](SafetySettings& s) { s.enabling_button = bad; }), "enabling_button");
