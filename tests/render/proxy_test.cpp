@@ -420,6 +420,39 @@ TEST(ProxyBall, comes_to_rest_among_all_that_it_touches) {
   ASSERT_GT(held_by_several, 100);
 }
 
+// Faces whose maps meet at unlike heights: walls that stand between two samples of a face.
+TEST(ProxyBall, stays_off_walls_between_faces_and_never_comes_behind_them) {
+  constexpr double height = 6e-4;
+  Rng rng(73);
+  int at_walls = 0;
+  for (const double radius : {3e-4, 1e-3}) {
+    for (const double rho : {0.01, 0.02, 0.05}) {
+      const auto flat = [](double at) { return tiled(map_of(4, [at](double, double) { return at; })); };
+      const auto surface = relief_on(mesh_of(plane_grid(0.02, 0.02, 4, 4)), {flat(0.0), flat(height)},
+                                     {Mapping::per_face, Vec2::Ones(), {FoldMode::keep, Blend::quintic, rho, {}}});
+      const Scene scene = must(Scene::build({instance_of(surface, 0.0, 0.0)}, radius));
+      ProxyState state;
+      ProxyCache cache(scene);
+      SurfaceCache looked;
+      const ReliefView view = surface->view(looked);
+      Vec3 place(0.0, 0.0, height + 1.1 * radius);
+      Vec3 heading(0.0, 0.0, -5e-5);
+      for (int i = 0; i < 1500; ++i) {
+        if (i % 60 == 59) heading = 6e-5 * random_direction(rng);
+        place += heading;
+        if (place.head<2>().cwiseAbs().maxCoeff() > 8e-3) heading.head<2>() *= -1.0;
+        if ((place.z() < -5e-4 && heading.z() < 0.0) || (place.z() > 2.5e-3 && heading.z() > 0.0)) heading.z() *= -1.0;
+        step(scene, state, cache, probe_at(place), tick);
+        const Foot nearest = view.nearest(state.proxy, infinity);
+        ASSERT_GT(nearest.distance, radius * (1.0 - 1e-6)) << "radius " << radius << ", rho " << rho << ", tick " << i;
+        ASSERT_GT(view.front(nearest).dot(state.proxy - nearest.point), 0.0) << "tick " << i;
+        at_walls += nearest.distance < 1.01 * radius && std::abs(nearest.normal.z()) < 0.7 ? 1 : 0;
+      }
+    }
+  }
+  ASSERT_GT(at_walls, 300);
+}
+
 TEST(ProxyEnergy, a_stiffer_scene_is_paid_from_the_account) {
   // Amendment 6: at a fixed probe, a change of the scene gives the hand no more than the contact has dissipated.
   const auto surface = relief_on(mesh_of(plane_grid(0.04, 0.04, 4, 4)), {tiled(wavy_map(amplitude))}, {});

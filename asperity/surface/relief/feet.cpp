@@ -49,6 +49,7 @@ class ReliefFeetSearch {
     const double samples = std::min(texels_across(frame) / leaf_of_texel, std::ldexp(1.0, deepest_part));
     last_ = std::max(1 << (frame.stitched ? least_level_stitched : least_level), static_cast<int>(std::ceil(samples)));
     step_ = 1.0 / last_;
+    narrowest_ = frame.stitched ? narrowest(frame.band) : 1.0;
     const Vec3& edge_u = frame.prism.edge_u;
     const Vec3& edge_v = frame.prism.edge_v;
     least_drop_ =
@@ -73,6 +74,10 @@ class ReliefFeetSearch {
   static constexpr double same_place = 0.25;
   /// Squared, in twice the squared length of the longest of the lattice's steps.
   static constexpr double far_off = 4.5;
+  /// Of the lattice, that a band between two faces is wide at least where samples show what stands in it.
+  static constexpr double few_steps = 4.0;
+  /// How far the surface between two samples may be off the line from one to the other, of its length.
+  static constexpr double of_chord = 0.25;
   /// The least of the samples around a place that is looked for may be so many of them off it, in thin triangles.
   static constexpr int beside = 2;
 
@@ -219,6 +224,90 @@ class ReliefFeetSearch {
     }
     const auto beside_touching = static_cast<float>(asked_.touching * asked_.touching + 2.0 * least_drop_);
     if (any(nearest <= beside_touching)) look_closely(frame, from_u, from_v, squares, beside_touching);
+    if (narrowest_ >= few_steps * step_) return;
+    for (const bool along_u : {true, false}) look_between(frame, from_u, from_v, along_u, samples, off);
+  }
+
+  /// Of the bands in which a face's heights and those across its edges meet (barycentric); 1: it has none.
+  static double narrowest(const StitchBand& band) noexcept {
+    double least = 1.0;
+    for (const float look : band.look) {
+      if (look > 0.0F) least = std::min(least, static_cast<double>(look));
+    }
+    return least;
+  }
+
+  /// Descends from between samples that are far apart: where the maps of two faces meet at unlike heights, a wall
+  /// stands in a band that is narrower than the lattice's steps. Where the line from one sample to the other comes as
+  /// near as those beside it, the surface is sampled along it, as finely as the band is narrow.
+  void look_between(const ReliefFrame& frame, int from_u, int from_v, bool along_u, const BlockSamples& samples,
+                    const Eigen::Vector3f& p) noexcept {
+    constexpr float more_than_level = 1.2F;  // of the squared distance
+    const int ahead = along_u ? stride : 1;
+    const int beside = along_u ? 1 : stride;
+    const Vec3& edge = along_u ? frame.prism.edge_u : frame.prism.edge_v;
+    const float far = more_than_level * static_cast<float>(step_ * step_ * edge.squaredNorm());
+    float squares[BlockSamples::count];
+    std::fill_n(squares, BlockSamples::count, BlockSamples::nowhere);
+    bool any_far = false;
+    for (int k = 0; k < stride * stride - ahead; ++k) {
+      if (!along_u && k % stride == stride - 1) continue;
+      const Eigen::Vector3f way = sample_at(samples, k + ahead) - sample_at(samples, k);
+      const float length = way.squaredNorm();
+      if (!(length > far && length < BlockSamples::far_off)) continue;
+      const Eigen::Vector3f to = p - sample_at(samples, k);
+      squares[k] = (to - std::clamp(to.dot(way) / length, 0.0F, 1.0F) * way).squaredNorm();
+      any_far = true;
+    }
+    if (!any_far) return;
+    for (int i = 0; i < BlockSamples::across; ++i) {
+      for (int j = 0; j < BlockSamples::across; ++j) {
+        const int k = (i + 1) * stride + j + 1;
+        const float here = squares[k];
+        if (!(here < BlockSamples::nowhere) || here > squares[k - beside] || here >= squares[k + beside]) continue;
+        const auto length = static_cast<double>((sample_at(samples, k + ahead) - sample_at(samples, k)).norm());
+        if (std::sqrt(static_cast<double>(here)) <= reach_ + of_chord * length)
+          sample_between(frame, {(from_u + i) * step_, (from_v + j) * step_}, along_u, length / (step_ * edge.norm()));
+      }
+    }
+  }
+
+  /// From a sample to the next one, `steepness` times as far as on the level, and descends from what is nearer than
+  /// what is beside it on the way.
+  void sample_between(const ReliefFrame& frame, const Vec2& from, bool along_u, double steepness) noexcept {
+    constexpr int most = 64;
+    const double wanted = 0.5 * few_steps * steepness * step_ / narrowest_;
+    const int parts = std::clamp(static_cast<int>(std::ceil(wanted / lanes)) * static_cast<int>(lanes), 4, most);
+    double before = infinity;
+    double here = infinity;
+    const auto at = [&](int part) -> Vec2 {
+      const double share = (part + 0.5) / parts * step_;
+      return along_u ? Vec2(from.x() + share, from.y()) : Vec2(from.x(), from.y() + share);
+    };
+    const auto look = [&](int part, double next) {
+      if (part >= 0 && here < before && here <= next) descend_from({frame, at(part).x(), at(part).y()});
+      before = here;
+      here = next;
+    };
+    for (int first = 0; first < parts; first += static_cast<int>(lanes)) {
+      Lanes u;
+      Lanes v;
+      Lanes heights;
+      for (std::size_t k = 0; k < lanes; ++k) {
+        const Vec2 place = at(first + static_cast<int>(k));
+        u[k] = place.x();
+        v[k] = std::min(place.y(), 1.0 - u[k]);
+      }
+      surface_.heights_alone(frame, u, v, heights);
+      for (std::size_t k = 0; k < lanes; ++k)
+        look(first + static_cast<int>(k) - 1, (frame.prism.point({u[k], v[k], heights[k]}) - p_).norm());
+    }
+    look(parts - 1, infinity);
+    count_.evaluations += static_cast<std::uint32_t>(parts) / static_cast<std::uint32_t>(lanes);
+  }
+
+  static Eigen::Vector3f sample_at(const BlockSamples& samples, int k) noexcept {
+    return {samples.x[k], samples.y[k], samples.z[k]};
   }
 
   /// A place beside a sample, in steps of the lattice, and its squared distance.
@@ -325,7 +414,7 @@ class ReliefFeetSearch {
     float highest = -BlockSamples::nowhere;
     float radius = 0.0F;
     float apart = 0.0F;
-    const auto at = [&](int k) { return Eigen::Vector3f(samples.x[k], samples.y[k], samples.z[k]); };
+    const auto at = [&](int k) { return sample_at(samples, k); };
     for (int k = 0; k < stride * stride; ++k) {
       if (!(samples.x[k] < BlockSamples::far_off)) continue;
       const Eigen::Vector3f here = at(k);
@@ -462,8 +551,9 @@ class ReliefFeetSearch {
   ReliefFrame frame_;
   ReliefBlocks::Block block_;
   BlockSamples samples_;
-  double step_ = 1.0;  ///< of the face's lattice (barycentric)
-  int last_ = 1;       ///< sample along an edge
+  double step_ = 1.0;       ///< of the face's lattice (barycentric)
+  int last_ = 1;            ///< sample along an edge
+  double narrowest_ = 1.0;  ///< of the face's bands (barycentric)
   /// By how much (m^2) a sample may be farther than a place beside it that is nearest, at least: at the face's border
   /// what lies on one side of it is not known.
   double least_drop_ = 0.0;
