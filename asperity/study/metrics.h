@@ -94,10 +94,10 @@ std::vector<EnergyMetrics::Asked> account_rows(const EnergyAccount& account);
 struct TickMetrics {
   std::uint64_t ticks = 0;
   std::uint64_t contact = 0;
-  double duration = 0.0;                   ///< s
-  double rate = 0.0;                       ///< ticks a second (Hz)
-  double length = 0.0;                     ///< distance travelled in the contact phase (m)
-  std::array<std::uint64_t, 12> flags{};   ///< by bit of TickFlag
+  double duration = 0.0;                                             ///< s
+  double rate = 0.0;                                                 ///< ticks a second (Hz)
+  double length = 0.0;                                               ///< distance travelled in the contact phase (m)
+  std::array<std::uint64_t, Names<TickFlag>::table.size()> flags{};  ///< by bit of TickFlag
   std::uint64_t safety_interventions = 0;  ///< ticks whose commanded force is not the rendered one
   double largest_intervention = 0.0;       ///< largest |rendered - commanded| (N)
 };
