@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
@@ -23,15 +24,18 @@ using Bytes = std::vector<std::byte>;
 using Json = nlohmann::json;
 
 constexpr std::string_view magic = "ASPTRACE";
-constexpr std::uint32_t trace_format_version = 1;
+constexpr std::uint32_t trace_format_version = 2;
 // The level of volumes shares four bytes with the flags: traces from before there were volumes have it 0.
 constexpr unsigned level_shift = 24;
 constexpr std::uint32_t byte_order_mark = 0x01020304U;
 constexpr std::uint32_t frame_records = 1;
 constexpr std::uint32_t frame_end = 2;
+constexpr std::uint32_t frame_event = 3;
+constexpr std::uint32_t frame_key = 4;
 constexpr std::size_t header_fixed = 8 + 4 * 4;  // magic, version, byte order, record size, metadata length
 constexpr std::size_t frame_overhead = 12;       // length, type, checksum
 constexpr std::uint32_t max_metadata = 256U << 20U;
+constexpr std::uint32_t max_event = 256U << 20U;
 constexpr std::size_t max_records_per_frame = 65536;
 
 constexpr std::uint64_t fnv_prime = 1099511628211ULL;
@@ -274,9 +278,10 @@ struct TraceWriter::State {
   int descriptor = -1;
   bool sync = false;
   std::size_t per_frame = 0;
-  Bytes frame;                // the frame being filled
-  std::uint32_t pending = 0;  // records in it
-  std::uint64_t written = 0;  // records appended in all
+  Bytes frame;                  // the frame being filled
+  std::uint32_t pending = 0;    // records in it
+  std::uint64_t written = 0;    // records appended in all
+  std::uint64_t last_tick = 0;  // of the last of them
   ForceHash hash;
   std::optional<Error> failure;  // after it nothing more is written: the file ends in a cut frame, as after a crash
 
@@ -316,6 +321,31 @@ struct TraceWriter::State {
     ASPERITY_CHECK(write(frame));
     start_frame();
     return success();
+  }
+  /// A frame of its own behind what is pending.
+  Status write_between(std::uint32_t type, std::uint64_t tick, std::string_view kind, std::span<const std::byte> body) {
+    if (descriptor < 0) return refusal();
+    if (kind.size() > max_event || body.size() > max_event - kind.size()) {
+      return refused_file(ErrorCode::too_large, fmt::format("an event or key frame has {} bytes", body.size()), path,
+                          "256 MiB at most");
+    }
+    if (written > 0 && tick <= last_tick) {
+      return bad_value(fmt::format("is {}, and tick {} has been written", tick, last_tick), "tick",
+                       "a tick that is yet to come");
+    }
+    ASPERITY_CHECK(flush());
+    Bytes bytes;
+    open_frame(bytes, type);
+    Encoder encoder(bytes);
+    encoder.field(tick);
+    if (type == frame_event) {
+      encoder.field(static_cast<std::uint32_t>(kind.size()));
+      const auto name = as_bytes_of(kind);
+      bytes.insert(bytes.end(), name.begin(), name.end());
+    }
+    bytes.insert(bytes.end(), body.begin(), body.end());
+    close_frame(bytes);
+    return write(bytes);
   }
 };
 
@@ -366,7 +396,16 @@ Status TraceWriter::append(const TraceRecord& record) {
   state_->hash.add(record);
   ++state_->pending;
   ++state_->written;
+  state_->last_tick = record.tick;
   return state_->pending == state_->per_frame ? state_->flush() : success();
+}
+
+Status TraceWriter::event(const TraceEvent& event) {
+  return state_->write_between(frame_event, event.tick, event.kind, as_bytes_of(event.text));
+}
+
+Status TraceWriter::key_frame(const TraceKeyFrame& key_frame) {
+  return state_->write_between(frame_key, key_frame.tick, {}, key_frame.state);
 }
 
 Status TraceWriter::flush() {
@@ -471,10 +510,10 @@ Result<std::size_t> check_header(std::span<const std::byte> bytes) {
   if (number_at<std::uint32_t>(bytes, 12) != byte_order_mark) {
     return refuse(ErrorCode::file_unsupported, "has another byte order, or its header is damaged", 12, "little-endian");
   }
-  if (const std::uint32_t version = number_at<std::uint32_t>(bytes, 8); version != trace_format_version) {
+  if (const std::uint32_t version = number_at<std::uint32_t>(bytes, 8); version < 1 || version > trace_format_version) {
     return refuse(ErrorCode::file_unsupported,
                   fmt::format("has version {} of the trace format, or its header is damaged", version), 8,
-                  fmt::format("version {}", trace_format_version));
+                  fmt::format("versions 1 to {}", trace_format_version));
   }
   const std::uint32_t length = number_at<std::uint32_t>(bytes, 20);
   if (length > max_metadata) {
@@ -531,9 +570,46 @@ class FrameReader {
     }
     const std::uint32_t type = number_at<std::uint32_t>(bytes_, at + 4);
     const auto payload = content.subspan(8);
-    const bool good = type == frame_records ? records(payload) : type == frame_end && end(payload);
-    if (!good) return stop(fmt::format("has a frame at byte {} that contradicts itself", at));
+    if (!content_of(type, payload)) return stop(fmt::format("has a frame at byte {} that contradicts itself", at));
     return at + frame_overhead + length;
+  }
+
+  bool content_of(std::uint32_t type, std::span<const std::byte> payload) {
+    const bool has_events = number_at<std::uint32_t>(bytes_, 8) > 1;
+    switch (type) {
+      case frame_records: return records(payload);
+      case frame_end: return end(payload);
+      case frame_event: return has_events && event(payload);
+      case frame_key: return has_events && key_frame(payload);
+      default: return false;
+    }
+  }
+
+  /// What lies between two ticks belongs before the later one.
+  bool follows_records(std::uint64_t tick) const { return trace_.records.empty() || tick > trace_.records.back().tick; }
+
+  bool event(std::span<const std::byte> payload) {
+    constexpr std::size_t fixed = 12;
+    if (payload.size() < fixed) return false;
+    const std::size_t kind = number_at<std::uint32_t>(payload, 8);
+    const auto tick = number_at<std::uint64_t>(payload, 0);
+    if (kind > payload.size() - fixed || !follows_records(tick)) return false;
+    const auto text = [](std::span<const std::byte> bytes) {
+      std::string copy(bytes.size(), '\0');
+      std::transform(bytes.begin(), bytes.end(), copy.begin(), [](std::byte b) { return static_cast<char>(b); });
+      return copy;
+    };
+    trace_.events.push_back({tick, text(payload.subspan(fixed, kind)), text(payload.subspan(fixed + kind))});
+    return true;
+  }
+
+  bool key_frame(std::span<const std::byte> payload) {
+    if (payload.size() < 8) return false;
+    const auto tick = number_at<std::uint64_t>(payload, 0);
+    const auto state = payload.subspan(8);
+    if (!follows_records(tick)) return false;
+    trace_.key_frames.push_back({tick, {state.begin(), state.end()}, trace_.events.size()});
+    return true;
   }
 
   bool records(std::span<const std::byte> payload) {

@@ -7,6 +7,9 @@
 //   frame   payload length u32, type u32, payload, CRC-32 u32 of length, type and payload
 //     type 1  record count u32, records
 //     type 2  end: record count u64, force hash u64; a finished file has it, a file cut by a crash has not
+//     type 3  event: tick u64, length of its kind u32, kind, text (UTF-8)
+//     type 4  key frame: tick u64, state
+// Version 1 has no types 3 and 4. The order of frames is the order in time.
 // One record is the fields of TraceRecord in the order of its declaration, f64, u64 or u32 each; quaternions w, x, y,
 // z. All bits are kept: -0, denormals and NaN with their payload.
 
@@ -62,6 +65,29 @@ struct TraceMetadata {
 /// [any]
 std::string to_json(const TraceMetadata& metadata);
 
+/// What happened before tick `tick` was rendered, beside the probe. Kinds and their texts:
+///   "scene"        another scene from here on: its canonical JSON
+///   "edit"         one change of the scene that shares all else: JSON of a SceneEdit
+///   "raise"        a fault that the loop has seen: its name
+///   "acknowledge"  of that
+///   "released"     the device has let go of the force by itself: the safety stage's last one counts as zero
+///   "stopping"     from here on nothing is rendered, the force is ramped down: what ServoThread's last ticks are
+///   "lost"         a gap before this tick: how many ticks the recorder could not keep
+///   "note"         for people
+struct TraceEvent {
+  std::uint64_t tick = 0;
+  std::string kind;
+  std::string text;
+};
+
+/// The state as it was before tick `tick` was rendered, what happened before it in the file included: from here on a
+/// trace can be replayed (live_trace.h).
+struct TraceKeyFrame {
+  std::uint64_t tick = 0;
+  std::vector<std::byte> state;
+  std::size_t events_before = 0;  ///< of the trace's events, in the file; filled by reading
+};
+
 /// How often a trace reaches the file.
 struct TraceWriterSettings {
   std::size_t records_per_frame = 256;  ///< a crash loses at most this many ticks; 1 to 65536
@@ -84,6 +110,11 @@ class TraceWriter {
 
   /// Adds a tick; a full frame is written out. Errors: file_unwritable (disk full); bad_value after finish().
   Status append(const TraceRecord& record);
+  /// Writes what is pending, and the event behind it. Errors: file_unwritable; bad_value (after finish(), a tick
+  /// that is written already); too_large (more than 256 MiB).
+  Status event(const TraceEvent& event);
+  /// Writes what is pending, and the key frame behind it. Errors: as event().
+  Status key_frame(const TraceKeyFrame& key_frame);
   /// Writes what is pending as a frame now.
   Status flush();
   /// Writes what is pending and the end frame, and closes. Errors: file_unwritable.
@@ -105,12 +136,14 @@ struct Trace {
   bool complete = false;         ///< the end frame was there and agrees
   std::uint64_t lost_bytes = 0;  ///< at the end of the file, behind the last good frame
   std::string damage;            ///< empty when complete; else one sentence saying what and at which byte
+  std::vector<TraceEvent> events;
+  std::vector<TraceKeyFrame> key_frames;
 };
 
 /// Reads a trace. Frames are taken up to the first one that is cut or damaged; what follows is counted in `lost_bytes`
 /// and described in `damage` (later frames are not used: a replay needs ticks without a gap). Errors: file_missing,
 /// file_empty, file_truncated (inside the header), file_malformed (not a trace, header damaged), file_unsupported
-/// (newer version, other byte order or record layout). [main]
+/// (newer version, other byte order or record layout). Versions 1 and 2 are read. [main]
 Result<Trace> read_trace(const std::string& path);
 /// The same from the bytes of a file; errors have no file name. [any]
 Result<Trace> parse_trace(std::span<const std::byte> bytes);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <bit>
@@ -242,6 +243,107 @@ TEST_F(TraceFile, AMissingFrameIsNoticedAtTheEnd) {
   EXPECT_FALSE(read_trace(at("a.trace")).value().complete);
 }
 
+/// Everything in its order: a number of each tick, the kind of each event, "key" of a key frame.
+std::string order_of(const Trace& trace) {
+  std::string order;
+  std::size_t event = 0;
+  std::size_t key = 0;
+  const auto before = [&](std::uint64_t tick) {
+    for (bool more = true; more;) {
+      const bool has_key = key < trace.key_frames.size() && trace.key_frames[key].tick <= tick;
+      const bool has_event = event < trace.events.size() && trace.events[event].tick <= tick;
+      more = has_key || has_event;
+      if (has_key && trace.key_frames[key].events_before <= event) {
+        order += "key" + std::to_string(trace.key_frames[key++].state.size()) + " ";
+      } else if (has_event) {
+        order += trace.events[event].kind + "=" + trace.events[event].text + " ";
+        ++event;
+      } else {
+        return;
+      }
+    }
+  };
+  for (const TraceRecord& record : trace.records) {
+    before(record.tick);
+    order += std::to_string(record.tick) + " ";
+  }
+  before(UINT64_MAX);
+  return order;
+}
+
+/// Ticks, events and key frames, more ticks in a frame than there ever are between two events.
+void write_live(TraceWriter& writer) {
+  const auto ticks = [&](std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t n = from; n < to; ++n) ASSERT_TRUE(writer.append(record_of(n)).ok());
+  };
+  ASSERT_TRUE(writer.key_frame({0, std::vector<std::byte>(3, std::byte{7})}).ok());
+  ticks(0, 2);
+  ASSERT_TRUE(writer.event({2, "edit", "zoom"}).ok());
+  ASSERT_TRUE(writer.key_frame({2, {}}).ok());
+  ASSERT_TRUE(writer.event({2, "note", ""}).ok());
+  ticks(2, 3);
+  ASSERT_TRUE(writer.event({6, "lost", "3"}).ok());
+  ticks(6, 8);
+}
+
+TEST_F(TraceFile, EventsAndKeyFramesKeepTheirOrder) {
+  TraceWriter writer = TraceWriter::open(at("a.trace"), some_metadata(), {.records_per_frame = 100}).value();
+  write_live(writer);
+  ASSERT_TRUE(writer.finish().ok());
+  const Trace trace = read_trace(at("a.trace")).value();
+  EXPECT_TRUE(trace.complete);
+  EXPECT_EQ(order_of(trace), "key3 0 1 edit=zoom key0 note= 2 lost=3 6 7 ");
+  ASSERT_EQ(trace.key_frames.size(), 2U);
+  EXPECT_EQ(trace.key_frames[0].state, std::vector<std::byte>(3, std::byte{7}));
+  EXPECT_EQ(trace.key_frames[1].events_before, 1U);
+  EXPECT_EQ(trace.events[2].tick, 6U);
+}
+
+TEST_F(TraceFile, AnEventOfATickThatIsWrittenIsRefused) {
+  TraceWriter writer = TraceWriter::open(at("a.trace"), {}, {.records_per_frame = 2}).value();
+  ASSERT_TRUE(writer.append(record_of(5)).ok());
+  EXPECT_EQ(writer.event({5, "note", "late"}).error().code, ErrorCode::bad_value);
+  EXPECT_EQ(writer.key_frame({5, {}}).error().code, ErrorCode::bad_value);
+  EXPECT_TRUE(writer.event({6, "note", "in time"}).ok());
+  ASSERT_TRUE(writer.finish().ok());
+  EXPECT_FALSE(writer.event({7, "note", ""}).ok());
+  EXPECT_EQ(order_of(read_trace(at("a.trace")).value()), "5 note=in time ");
+}
+
+TEST_F(TraceFile, AnyFlippedByteOfEventsIsDetected) {
+  TraceWriter writer = TraceWriter::open(at("a.trace"), {}).value();
+  write_live(writer);
+  ASSERT_TRUE(writer.finish().ok());
+  const std::string whole = bytes_of(at("a.trace"));
+  const std::string order = order_of(read_trace(at("a.trace")).value());
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string bytes = whole;
+    bytes[i] = static_cast<char>(static_cast<unsigned char>(bytes[i]) ^ 0x80U);
+    const Result<Trace> result = parsed(bytes);
+    if (!result) continue;
+    ASSERT_FALSE(result->complete) << "byte " << i;
+    ASSERT_TRUE(order.starts_with(order_of(*result))) << "byte " << i;
+  }
+}
+
+TEST_F(TraceFile, AWriterThatIsKilledLeavesWhatItHadWritten) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    TraceWriter writer = TraceWriter::open(at("a.trace"), some_metadata(), {.records_per_frame = 100}).value();
+    write_live(writer);
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const Trace trace = read_trace(at("a.trace")).value();
+  EXPECT_FALSE(trace.complete);
+  EXPECT_EQ(trace.lost_bytes, 0U);
+  EXPECT_EQ(to_json(trace.metadata), to_json(some_metadata()));
+  EXPECT_EQ(order_of(trace), "key3 0 1 edit=zoom key0 note= 2 lost=3 ");
+}
+
 TEST_F(TraceFile, EachBadFileHasItsError) {
   const auto code_of = [&](const std::string& path) {
     const Result<Trace> result = read_trace(path);
@@ -257,10 +359,10 @@ TEST_F(TraceFile, EachBadFileHasItsError) {
   put(at("other.trace"), "solid bunny\nfacet normal 0 0 1\n");
   EXPECT_EQ(code_of(at("other.trace")), ErrorCode::file_malformed);
   std::string newer = trace_bytes(at("a.trace"), 1, 1, true);
-  newer[8] = 2;
+  newer[8] = 3;
   put(at("newer.trace"), newer);
   EXPECT_EQ(code_of(at("newer.trace")), ErrorCode::file_unsupported);
-  EXPECT_NE(read_trace(at("newer.trace")).error().message().find("version 2"), std::string::npos);
+  EXPECT_NE(read_trace(at("newer.trace")).error().message().find("version 3"), std::string::npos);
   std::string swapped = trace_bytes(at("a.trace"), 1, 1, true);
   std::swap(swapped[12], swapped[15]);
   std::swap(swapped[13], swapped[14]);
@@ -359,6 +461,27 @@ std::string checksum(const std::string& bytes) {
   return text;
 }
 
+/// The same bytes as a file of version 1.
+std::string as_version_1(std::string bytes) {
+  bytes[8] = 1;
+  const std::size_t header = 24 + static_cast<unsigned char>(bytes[20]) + 256U * static_cast<unsigned char>(bytes[21]);
+  return bytes.replace(header, 4, checksum(bytes.substr(0, header)));
+}
+
+TEST_F(TraceFile, FilesOfVersion1AreReadAndHaveNoEvents) {
+  const Trace plain = parsed(as_version_1(trace_bytes(at("a.trace"), 5, 2, true))).value();
+  EXPECT_TRUE(plain.complete);
+  expect_bit_equal(plain.records, records_of(5));
+  TraceWriter writer = TraceWriter::open(at("b.trace"), {}).value();
+  ASSERT_TRUE(writer.append(record_of(0)).ok());
+  ASSERT_TRUE(writer.event({1, "note", "no such thing then"}).ok());
+  ASSERT_TRUE(writer.finish().ok());
+  const Trace odd = parsed(as_version_1(bytes_of(at("b.trace")))).value();
+  EXPECT_EQ(odd.records.size(), 1U);
+  EXPECT_TRUE(odd.events.empty());
+  EXPECT_NE(odd.damage.find("contradicts itself"), std::string::npos);
+}
+
 const std::string& small_trace() {
   static const std::string bytes = [] {
     const std::string path = (fs::temp_directory_path() / ("asperity-small-" + std::to_string(::getpid()))).string();
@@ -390,14 +513,21 @@ RC_GTEST_PROP(TraceFileFuzz, NonsenseWithAGoodChecksumIsRefused, ()) {
   const std::size_t header = small_trace().size() - 2 * (12 + 4 + 340) - 28;
   const std::string payload = *any_bytes();
   RC_PRE(payload.size() < 256U);
-  std::string frame{static_cast<char>(payload.size()), 0, 0, 0, static_cast<char>(*rc::gen::inRange(0, 4)), 0, 0, 0};
+  const int type = *rc::gen::inRange(0, 6);
+  std::string frame{static_cast<char>(payload.size()), 0, 0, 0, static_cast<char>(type), 0, 0, 0};
   frame += payload;
   const Result<Trace> result = parsed(small_trace().substr(0, header) + frame + checksum(frame));
   RC_ASSERT(result.ok());
   RC_ASSERT(!result->complete);
-  // An empty frame of records, four zero bytes, is the only sense there is in so few bytes.
+  // The only sense there is in so few bytes: an empty frame of records, four zero bytes, an event whose kind fits in,
+  // and a key frame of any state.
   const bool empty_frame = frame == std::string{4, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0};
-  RC_ASSERT((result->lost_bytes == 0U) == empty_frame);
+  const bool event = type == 3 && payload.size() >= 12 && payload.substr(9, 3) == std::string(3, '\0') &&
+                     static_cast<unsigned char>(payload[8]) <= payload.size() - 12;
+  const bool key_frame = type == 4 && payload.size() >= 8;
+  RC_ASSERT((result->lost_bytes == 0U) == (empty_frame || event || key_frame));
+  RC_ASSERT(result->events.size() == (event ? 1U : 0U));
+  RC_ASSERT(result->key_frames.size() == (key_frame ? 1U : 0U));
 }
 
 TEST(TraceFileFuzz, ChecksumIsTheUsualCrc32) {
