@@ -155,6 +155,14 @@ void SafetyStage::acknowledge() noexcept {
   raised_ = false;
 }
 
+void SafetyStage::restore(const SafetyMemory& memory) noexcept {
+  last_ = memory.last_force;
+  engaged_ = memory.engaged;
+  fault_ = memory.fault;
+  raised_ = memory.raised;
+  armed_ = memory.armed;
+}
+
 void SafetyStage::start_anew() noexcept {
   armed_ = false;
   engaged_ = Seconds(0.0);

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "asperity/core/math.h"
+#include "asperity/core/names.h"
 #include "asperity/core/result.h"
 #include "asperity/core/samples.h"
 #include "asperity/device/profile.h"
@@ -20,6 +21,17 @@ enum class Fault : std::uint8_t {
   overrun,            ///< a tick took longer than the loop may be blind
   stalled,            ///< the renderer did not answer
   device_lost,        ///< the device no longer answers
+};
+/// As in traces.
+template <>
+struct Names<Fault> {
+  static constexpr auto table = std::to_array<Named<Fault>>({{Fault::none, "none"},
+                                                             {Fault::input_not_finite, "input_not_finite"},
+                                                             {Fault::output_not_finite, "output_not_finite"},
+                                                             {Fault::too_fast, "too_fast"},
+                                                             {Fault::overrun, "overrun"},
+                                                             {Fault::stalled, "stalled"},
+                                                             {Fault::device_lost, "device_lost"}});
 };
 /// What has happened, in a sentence for whoever holds the device. [any]
 std::string_view fault_sentence(Fault fault) noexcept;
@@ -49,6 +61,15 @@ struct SafetySettings {
 struct SafetyOutput {
   Vec3 force = Vec3::Zero();  ///< N, world; finite, within all limits
   Flags flags;                ///< only the bits that this stage sets
+};
+
+/// All that a SafetyStage carries from tick to tick.
+struct SafetyMemory {
+  Vec3 last_force = Vec3::Zero();  ///< N, world: sent at the last tick
+  Seconds engaged{0.0};            ///< since it was armed
+  Fault fault = Fault::none;
+  bool raised = false;  ///< the fault stays although nothing latches
+  bool armed = false;
 };
 
 /// The last stage before any device, simulated or real. [servo]
@@ -90,6 +111,11 @@ class SafetyStage {
   void raise(Fault fault) noexcept;
   /// Whoever holds the device has seen it: force is let in again as at the start, from what is commanded now.
   void acknowledge() noexcept;
+  /// The device has let go of the force by itself: the last one is zero from here on.
+  void released() noexcept { last_.setZero(); }
+  /// What it carries now, and goes on from.
+  [[nodiscard]] SafetyMemory memory() const noexcept { return {last_, engaged_, fault_, raised_, armed_}; }
+  void restore(const SafetyMemory& memory) noexcept;
   /// The one that stays, or of a stage that does not latch that of the last tick.
   [[nodiscard]] Fault fault() const noexcept { return fault_; }
 

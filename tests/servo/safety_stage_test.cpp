@@ -422,5 +422,66 @@ TEST(SafetyStage, RefusesEveryOtherSettingThatIsNone) {
   EXPECT_EQ(place([](SafetySettings&) {}), "accepted");
 }
 
+/// A stage that uses all that there is.
+SafetySettings every_setting() {
+  SafetySettings settings;
+  settings.max_force = 5.0;
+  settings.slew_limit = 2000.0;
+  settings.max_power = 1.0;
+  settings.max_velocity = 2.0;
+  settings.workspace_radius = 0.1;
+  settings.engage = Seconds(0.02);
+  settings.enabling_button = 1;
+  settings.longest_tick = Seconds(0.02);
+  return settings;
+}
+
+RC_GTEST_PROP(SafetyStage, GoesOnFromItsMemoryInAnotherStage, ()) {
+  SafetySettings settings = every_setting();
+  settings.latches = *rc::gen::arbitrary<bool>();
+  SafetyStage one = SafetyStage::build(settings).value();
+  SafetyStage other = SafetyStage::build(settings).value();
+  const auto ticks = *rc::gen::inRange(1, 200);
+  const auto share = [](int percent) { return *rc::gen::inRange(0, 100) < percent; };
+  for (int i = 0; i < ticks; ++i) {
+    // Whoever is not told anything else has it from the memory alone.
+    if (share(3)) one.raise(Fault::stalled);
+    if (share(3)) one.acknowledge();
+    if (share(3)) one.released();
+    other.restore(one.memory());
+    ProbeSample probe;
+    probe.buttons = share(90) ? 2U : 0U;
+    probe.twist.linear.x() = share(3) ? 3.0 : 0.2;
+    const ForceSample rendered = force(share(30) ? Vec3(Vec3::Zero()) : *any_force());
+    const Seconds dt(share(3) ? 0.05 : 1e-3);
+    const SafetyOutput a = one.apply(rendered, probe, dt);
+    const SafetyOutput b = other.apply(rendered, probe, dt);
+    RC_ASSERT(a.force == b.force);
+    RC_ASSERT(a.flags.bits() == b.flags.bits());
+    RC_ASSERT(one.fault() == other.fault());
+    RC_ASSERT(one.armed() == other.armed());
+  }
+}
+
+TEST(SafetyStage, RampsUpFromZeroOnceTheDeviceHasLetGo) {
+  SafetyStage s = armed(10.0, 1000.0);
+  for (int i = 0; i < 10; ++i) s.apply(force(Vec3(5.0, 0.0, 0.0)), {}, Seconds(1e-3));
+  ASSERT_EQ(s.last_force().x(), 5.0);
+  s.released();
+  EXPECT_TRUE(s.last_force().isZero(0.0));
+  EXPECT_TRUE(s.armed());
+  EXPECT_NEAR(s.apply(force(Vec3(5.0, 0.0, 0.0)), {}, Seconds(1e-3)).force.x(), 1.0, 1e-12);
+}
+
+TEST(SafetyStage, EveryFaultHasANameAndASentence) {
+  for (const Named<Fault>& fault : Names<Fault>::table) {
+    EXPECT_EQ(value_named<Fault>(fault.name), fault.value);
+    EXPECT_FALSE(fault_sentence(fault.value).empty()) << fault.name;
+  }
+  EXPECT_TRUE(names_differ<Fault>());
+  // The next one would be missing in the table.
+  EXPECT_EQ(Names<Fault>::table.size(), static_cast<std::size_t>(Fault::device_lost) + 1);
+}
+
 }  // namespace
 }  // namespace asperity::safety_stage_test
