@@ -175,6 +175,23 @@ class EnergyAccount {
     take(share * force);
     return share;
   }
+  /// Calls each(member) for everything that it remembers, in one order: for images of it. [any]
+  template <class Account, class Each>
+  static void each_member(Account& account, const Each& each) {
+    auto& [level, capacity, first, has_loose, moved, loose, advanced, stiffness, flows] = account;
+    each(level);
+    each(capacity);
+    each(first);
+    each(has_loose);
+    each(moved);
+    each(loose);
+    each(advanced);
+    each(stiffness);
+    for (auto& [asked, paid] : flows) {
+      each(asked);
+      each(paid);
+    }
+  }
   /// A force that only ever takes: nothing is asked of it. [servo]
   void take(const Vec3& force) noexcept {
     loose_ += force;
