@@ -78,6 +78,15 @@ Result<IsoSurface> IsoSurface::with_threshold(double threshold) const {
   return build(field_, threshold, inside_, threshold_speed_);
 }
 
+Result<IsoSurface> IsoSurface::moved_to(double threshold) const {
+  ASPERITY_CHECK(check_threshold(*field_, threshold));
+  IsoSurface moved = *this;
+  moved.threshold_ = threshold;
+  moved.schedule_.clear();
+  moved.surface_bounds_ = field_->bounds();
+  return moved;
+}
+
 Result<IsoSurface> IsoSurface::with_schedule(std::vector<ThresholdStep> steps) const {
   Seconds last{0.0};
   for (std::size_t i = 0; i < steps.size(); ++i) {

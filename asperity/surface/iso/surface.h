@@ -124,6 +124,10 @@ class IsoSurface {
                                   double threshold_speed = 0.02);
   /// The same field at another threshold: what a change while touching is made with. Errors as above. [build]
   [[nodiscard]] Result<IsoSurface> with_threshold(double threshold) const;
+  /// The same at once, without looking at the volume again: for what is changed again and again while it is touched.
+  /// The typical slope stays what it was, and surface_bounds() become the field's. Errors: bad_value (beyond the
+  /// field's range). [build]
+  [[nodiscard]] Result<IsoSurface> moved_to(double threshold) const;
   /// The same with a threshold that changes by the probe's clock: from its own at time 0 to that of each step at its
   /// time, evenly in between, and as the last step leaves it from there on. Errors: bad_value naming the step (times
   /// that do not rise from 0, thresholds that the field nowhere reaches). [build]
