@@ -5,7 +5,7 @@
 // Left out are the parts that not every build has (io/vdb, io/vtk) and the workbench (asperity/study: metrics,
 // pictures, reports), which a program includes by name and links as asperity::study.
 
-// core: units, frames, Result, what goes into a tick and comes out of it
+// core: units, frames, Result, what goes into a tick and comes out of it, a queue between two threads
 #include "asperity/core/fixed_vector.h"
 #include "asperity/core/formulation.h"
 #include "asperity/core/frames.h"
@@ -21,6 +21,7 @@
 #include "asperity/core/processor.h"
 #include "asperity/core/progress.h"
 #include "asperity/core/result.h"
+#include "asperity/core/ring_queue.h"
 #include "asperity/core/rng.h"
 #include "asperity/core/samples.h"
 #include "asperity/core/suggest.h"
@@ -153,21 +154,26 @@
 #include "asperity/device/device.h"
 #include "asperity/device/hand.h"
 #include "asperity/device/ideal_probe.h"
+#include "asperity/device/port.h"
 #include "asperity/device/profile.h"
 #include "asperity/device/replay_device.h"
+#include "asperity/device/shared_board.h"
 #include "asperity/device/simulated_device.h"
 #include "asperity/device/stroke.h"
 #include "asperity/device/velocity_estimator.h"
 
-// servo: safety stage, session, memory warmed before it
+// servo: the loop, its safety stage and watchdog, what it tells, the far side of a port
+#include "asperity/servo/device_process.h"
 #include "asperity/servo/loop_clock.h"
 #include "asperity/servo/mailbox.h"
 #include "asperity/servo/realtime.h"
 #include "asperity/servo/safety_stage.h"
 #include "asperity/servo/servo_thread.h"
 #include "asperity/servo/session.h"
+#include "asperity/servo/telemetry.h"
 #include "asperity/servo/time_histogram.h"
 #include "asperity/servo/warm_memory.h"
+#include "asperity/servo/watchdog.h"
 
 // io: files of meshes, images, volumes, scenes and traces
 #include "asperity/io/atomic_file.h"

@@ -12,7 +12,7 @@ namespace asperity {
 namespace {
 
 constexpr std::uint32_t loop_image_version = 1;
-constexpr std::size_t loop_image_bytes = 4 + 3 + 4 * 8;
+constexpr std::size_t loop_image_bytes = 4 + 4 + 4 * 8;
 constexpr const char* no_limit = "infinity";
 
 /// Calls each(name, member) for every setting.
@@ -104,12 +104,13 @@ std::uint64_t told_lost(const TraceEvent& event) {
 }  // namespace
 
 std::vector<std::byte> save_loop_state(const ProxyState& state, const SafetyMemory& safety, const Scene& scene) {
-  const auto& [last_force, engaged, fault, raised, armed] = safety;
+  const auto& [last_force, engaged, fault, raised, armed, withheld] = safety;
   std::vector<std::byte> bytes;
   put_number(bytes, loop_image_version, 4);
   put_number(bytes, static_cast<std::uint64_t>(fault), 1);
   put_number(bytes, raised ? 1 : 0, 1);
   put_number(bytes, armed ? 1 : 0, 1);
+  put_number(bytes, withheld ? 1 : 0, 1);
   for (const double number : {last_force.x(), last_force.y(), last_force.z(), engaged.count()})
     put_number(bytes, std::bit_cast<std::uint64_t>(number), 8);
   const std::vector<std::byte> image = save_state(state, scene);
@@ -129,13 +130,15 @@ Result<LoopState> restore_loop_state(std::span<const std::byte> image, const Sce
   const auto fault = static_cast<Fault>(number_of(image.subspan(4, 1)));
   const std::uint64_t raised = number_of(image.subspan(5, 1));
   const std::uint64_t armed = number_of(image.subspan(6, 1));
-  if (place_of_name(fault) == Names<Fault>::table.size() || raised > 1 || armed > 1)
+  const std::uint64_t withheld = number_of(image.subspan(7, 1));
+  if (place_of_name(fault) == Names<Fault>::table.size() || raised > 1 || armed > 1 || withheld > 1)
     return refuse(ErrorCode::file_malformed, "has a safety stage that there is not", 4);
-  const auto number = [&](std::size_t i) { return std::bit_cast<double>(number_of(image.subspan(7 + 8 * i, 8))); };
+  const auto number = [&](std::size_t i) { return std::bit_cast<double>(number_of(image.subspan(8 + 8 * i, 8))); };
   LoopState loop;
-  loop.safety = {Vec3(number(0), number(1), number(2)), Seconds(number(3)), fault, raised == 1, armed == 1};
+  loop.safety = {Vec3(number(0), number(1), number(2)), Seconds(number(3)), fault, raised == 1, armed == 1,
+                 withheld == 1};
   if (!loop.safety.last_force.allFinite() || !(loop.safety.engaged.count() >= 0.0))
-    return refuse(ErrorCode::file_malformed, "has a last force that is none", 7);
+    return refuse(ErrorCode::file_malformed, "has a last force that is none", 8);
   ASPERITY_TRY(loop.proxy, restore_state(image.subspan(loop_image_bytes), scene));
   return loop;
 }

@@ -48,6 +48,7 @@ std::string_view fault_sentence(Fault fault) noexcept {
     case Fault::overrun: return "a tick took longer than the loop may be blind";
     case Fault::stalled: return "the renderer did not answer in time";
     case Fault::device_lost: return "the device no longer answers";
+    case Fault::clock_stopped: return "the clock that ticks go by stands still";
   }
   return "";
 }
@@ -106,66 +107,56 @@ Fault SafetyStage::seen(const ForceSample& rendered, const ProbeSample& probe, S
 SafetyOutput SafetyStage::apply(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) noexcept {
   Flags flags;
   const Vec3& force = rendered.wrench.force;
-  if (!faulted()) fault_ = seen(rendered, probe, dt);
+  if (!faulted()) now_.fault = seen(rendered, probe, dt);
   flags.set(TickFlag::input_not_finite, !finite(probe));
   flags.set(TickFlag::output_not_finite, !force.allFinite());
-  const bool has_own_flag = fault_ == Fault::input_not_finite || fault_ == Fault::output_not_finite;
-  flags.set(TickFlag::fault, faulted() || (fault_ != Fault::none && !has_own_flag));
+  const bool has_own_flag = now_.fault == Fault::input_not_finite || now_.fault == Fault::output_not_finite;
+  flags.set(TickFlag::fault, faulted() || (now_.fault != Fault::none && !has_own_flag));
   const int button = settings_.enabling_button;
-  const bool enabled = button < 0 || (probe.buttons >> button & 1U) != 0;
+  const bool enabled = !now_.withheld && (button < 0 || (probe.buttons >> button & 1U) != 0);
   flags.set(TickFlag::not_enabled, !enabled);
   if (!enabled || faulted()) start_anew();
-  const bool good = fault_ == Fault::none && enabled;
+  const bool good = now_.fault == Fault::none && enabled;
   const bool said_inside = rendered.flags.has(TickFlag::started_inside);
   // A probe that begins in a volume is where it should be: the slew limit alone keeps its force from kicking.
   const bool field_alone = rendered.flags.has(TickFlag::field_force) && !rendered.flags.has(TickFlag::contact);
-  if (!armed_ && good) armed_ = !said_inside && (force.isZero(0.0) || field_alone);
-  flags.set(TickFlag::started_inside, !armed_);
-  if (armed_ && is_time(dt)) engaged_ += dt;
+  if (!now_.armed && good) now_.armed = !said_inside && (force.isZero(0.0) || field_alone);
+  flags.set(TickFlag::started_inside, !now_.armed);
+  if (now_.armed && is_time(dt)) now_.engaged += dt;
 
-  Vec3 target = good && armed_ ? force : Vec3(Vec3::Zero());
-  const double share = settings_.engage.count() > 0.0 ? std::min(1.0, engaged_ / settings_.engage) : 1.0;
+  Vec3 target = good && now_.armed ? force : Vec3(Vec3::Zero());
+  const double share = settings_.engage.count() > 0.0 ? std::min(1.0, now_.engaged / settings_.engage) : 1.0;
   flags.set(TickFlag::force_limited, shorten(target, share * settings_.max_force));
   keep_slew(target, dt, flags);
   keep_inside(probe, flags);
-  return {last_, flags};
+  return {now_.last_force, flags};
 }
 
 SafetyOutput SafetyStage::ramp_down(Seconds dt) noexcept {
   Flags flags;
   keep_slew(Vec3::Zero(), dt, flags);
-  return {last_, flags};
+  return {now_.last_force, flags};
 }
 
 void SafetyStage::reset() noexcept {
-  last_.setZero();
-  acknowledge();
-  start_anew();
+  now_ = SafetyMemory{};
 }
 
 void SafetyStage::raise(Fault fault) noexcept {
   if (fault == Fault::none || faulted()) return;
-  fault_ = fault;
-  raised_ = true;
+  now_.fault = fault;
+  now_.raised = true;
 }
 
 void SafetyStage::acknowledge() noexcept {
   if (faulted()) start_anew();
-  fault_ = Fault::none;
-  raised_ = false;
-}
-
-void SafetyStage::restore(const SafetyMemory& memory) noexcept {
-  last_ = memory.last_force;
-  engaged_ = memory.engaged;
-  fault_ = memory.fault;
-  raised_ = memory.raised;
-  armed_ = memory.armed;
+  now_.fault = Fault::none;
+  now_.raised = false;
 }
 
 void SafetyStage::start_anew() noexcept {
-  armed_ = false;
-  engaged_ = Seconds(0.0);
+  now_.armed = false;
+  now_.engaged = Seconds(0.0);
 }
 
 /// Cuts the force to the workspace and the power: both make it smaller, the second without turning it.
@@ -177,16 +168,16 @@ void SafetyStage::keep_inside(const ProbeSample& probe, Flags& flags) noexcept {
   if (away > (1.0 - settings_.border) * radius) {
     const Vec3 outward = off / away;
     const double left = settings_.border > 0.0 ? std::max(0.0, (radius - away) / (settings_.border * radius)) : 0.0;
-    const double beyond = last_.dot(outward) - left * settings_.max_force;
+    const double beyond = now_.last_force.dot(outward) - left * settings_.max_force;
     if (beyond > 0.0) {
-      last_ -= beyond * outward;
+      now_.last_force -= beyond * outward;
       flags.set(TickFlag::at_border);
     }
   }
   // A sum that overflows is beyond the limit as well.
-  const double power = last_.dot(probe.twist.linear);
+  const double power = now_.last_force.dot(probe.twist.linear);
   if (!(power <= settings_.max_power)) {
-    last_ *= std::isfinite(power) ? settings_.max_power * inside / power : 0.0;
+    now_.last_force *= std::isfinite(power) ? settings_.max_power * inside / power : 0.0;
     flags.set(TickFlag::power_limited);
   }
 }
@@ -194,13 +185,13 @@ void SafetyStage::keep_inside(const ProbeSample& probe, Flags& flags) noexcept {
 /// From the last force towards another one as fast as it may.
 void SafetyStage::keep_slew(const Vec3& force, Seconds dt, Flags& flags) noexcept {
   Vec3 next = force;
-  Vec3 change = force - last_;
+  Vec3 change = force - now_.last_force;
   if (shorten(change, settings_.slew_limit * (is_time(dt) ? dt.count() : 0.0))) {
     flags.set(TickFlag::slew_limited);
-    next = last_ + change;
+    next = now_.last_force + change;
     shorten(next, settings_.max_force);
   }
-  last_ = next;
+  now_.last_force = next;
 }
 
 }  // namespace asperity

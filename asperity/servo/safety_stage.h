@@ -21,6 +21,7 @@ enum class Fault : std::uint8_t {
   overrun,            ///< a tick took longer than the loop may be blind
   stalled,            ///< the renderer did not answer
   device_lost,        ///< the device no longer answers
+  clock_stopped,      ///< the clock that ticks go by stands still
 };
 /// As in traces.
 template <>
@@ -31,7 +32,8 @@ struct Names<Fault> {
                                                              {Fault::too_fast, "too_fast"},
                                                              {Fault::overrun, "overrun"},
                                                              {Fault::stalled, "stalled"},
-                                                             {Fault::device_lost, "device_lost"}});
+                                                             {Fault::device_lost, "device_lost"},
+                                                             {Fault::clock_stopped, "clock_stopped"}});
 };
 /// What has happened, in a sentence for whoever holds the device. [any]
 std::string_view fault_sentence(Fault fault) noexcept;
@@ -63,13 +65,14 @@ struct SafetyOutput {
   Flags flags;                ///< only the bits that this stage sets
 };
 
-/// All that a SafetyStage carries from tick to tick.
+/// All that a safety stage carries from tick to tick.
 struct SafetyMemory {
   Vec3 last_force = Vec3::Zero();  ///< N, world: sent at the last tick
-  Seconds engaged{0.0};            ///< since it was armed
+  Seconds engaged{0.0};      ///< since it was armed
   Fault fault = Fault::none;
   bool raised = false;  ///< the fault stays although nothing latches
   bool armed = false;
+  bool withheld = false;
 };
 
 /// The last stage before any device, simulated or real. [servo]
@@ -103,6 +106,10 @@ class SafetyStage {
   SafetyOutput apply(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) noexcept;
   /// Ramps to zero at the slew limit: what a loop sends when it has no new force (overrun, stop).
   SafetyOutput ramp_down(Seconds dt) noexcept;
+  /// From here on there is no force, as while a button that has to be held is not: how a session ends.
+  void withhold() noexcept { now_.withheld = true; }
+  /// The device has let go by itself: the force grows from zero again, at the slew limit.
+  void released() noexcept { now_.last_force.setZero(); }
   /// As at the start: no fault, last force zero, and the next contact counts as started inside until a free tick was
   /// seen.
   void reset() noexcept;
@@ -111,34 +118,30 @@ class SafetyStage {
   void raise(Fault fault) noexcept;
   /// Whoever holds the device has seen it: force is let in again as at the start, from what is commanded now.
   void acknowledge() noexcept;
-  /// The device has let go of the force by itself: the last one is zero from here on.
-  void released() noexcept { last_.setZero(); }
-  /// What it carries now, and goes on from.
-  [[nodiscard]] SafetyMemory memory() const noexcept { return {last_, engaged_, fault_, raised_, armed_}; }
-  void restore(const SafetyMemory& memory) noexcept;
   /// The one that stays, or of a stage that does not latch that of the last tick.
-  [[nodiscard]] Fault fault() const noexcept { return fault_; }
+  [[nodiscard]] Fault fault() const noexcept { return now_.fault; }
 
-  [[nodiscard]] const Vec3& last_force() const noexcept { return last_; }
+  [[nodiscard]] const Vec3& last_force() const noexcept { return now_.last_force; }
   /// True once a tick with zero rendered force has been seen.
-  [[nodiscard]] bool armed() const noexcept { return armed_; }
+  [[nodiscard]] bool armed() const noexcept { return now_.armed; }
+  /// What the next tick goes by beside its inputs; to go on from, in another stage with the same settings.
+  [[nodiscard]] const SafetyMemory& memory() const noexcept { return now_; }
+  void restore(const SafetyMemory& memory) noexcept { now_ = memory; }
   [[nodiscard]] const SafetySettings& settings() const noexcept { return settings_; }
 
  private:
   explicit SafetyStage(const SafetySettings& settings) : settings_(settings) {}
   /// Whether there is a fault that is not over with what caused it.
-  [[nodiscard]] bool faulted() const noexcept { return fault_ != Fault::none && (settings_.latches || raised_); }
+  [[nodiscard]] bool faulted() const noexcept {
+    return now_.fault != Fault::none && (settings_.latches || now_.raised);
+  }
   [[nodiscard]] Fault seen(const ForceSample& rendered, const ProbeSample& probe, Seconds dt) const noexcept;
   void start_anew() noexcept;
   void keep_inside(const ProbeSample& probe, Flags& flags) noexcept;
   void keep_slew(const Vec3& force, Seconds dt, Flags& flags) noexcept;
 
   SafetySettings settings_;
-  Vec3 last_ = Vec3::Zero();
-  Seconds engaged_{0.0};  ///< since it was armed
-  Fault fault_ = Fault::none;
-  bool raised_ = false;  ///< it stays although nothing latches
-  bool armed_ = false;
+  SafetyMemory now_;
 };
 
 }  // namespace asperity
