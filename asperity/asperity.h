@@ -184,6 +184,7 @@
 #include "asperity/io/live_trace.h"
 #include "asperity/io/mesh_io.h"
 #include "asperity/io/recorded_path.h"
+#include "asperity/io/recorder.h"
 #include "asperity/io/scene_edit_json.h"
 #include "asperity/io/sparse_io.h"
 #include "asperity/io/texture_waves.h"

@@ -54,6 +54,7 @@ void add_library(Arguments& program, Console& console, Action& action);
 void add_scenes(Arguments& program, Console& console, Action& action);
 void add_bench(Arguments& program, Console& console, Action& action);
 void add_schema(Arguments& program, Console& console, Action& action);
+void add_run(Arguments& program, Console& console, Action& action);
 void add_doctor(Arguments& program, Console& console, Action& action);
 
 /// Declares a command: its options, and what it does with them.

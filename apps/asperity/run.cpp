@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "asperity/io/trace_file.h"
 #include "asperity/render/law_registry.h"
 #include "asperity/render/step.h"
 #include "asperity/servo/warm_memory.h"
@@ -230,6 +229,18 @@ ReportOrigin report_origin(const Experiment& experiment, const Console& console)
   origin.program = program_name();
   origin.notes = experiment.notes;
   return origin;
+}
+
+TraceMetadata trace_metadata(const Experiment& experiment, const std::string& source, const Console& console) {
+  TraceMetadata metadata;
+  metadata.scene = experiment.canonical_json;
+  metadata.source = source;
+  metadata.command = console.command_line;
+  metadata.device = experiment.device.name;
+  metadata.program = program_name();
+  metadata.rate = experiment.rate;
+  metadata.seed = experiment.simulated.seed;
+  return metadata;
 }
 
 Status make_output_folder(const std::string& folder) {

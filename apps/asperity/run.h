@@ -9,6 +9,7 @@
 #include "apps/asperity/command.h"
 #include "asperity/core/trace_record.h"
 #include "asperity/io/experiment.h"
+#include "asperity/io/trace_file.h"
 #include "asperity/servo/session.h"
 #include "asperity/study/metrics.h"
 #include "asperity/study/report.h"
@@ -42,6 +43,9 @@ std::string words_of_laws();
 std::vector<ReportFact> setup_facts(const Experiment& experiment);
 /// Where a report comes from: command, machine, date, program. [main]
 ReportOrigin report_origin(const Experiment& experiment, const Console& console);
+
+/// What the trace of an experiment is a trace of; `source`: the scene as the user gave it. [main]
+TraceMetadata trace_metadata(const Experiment& experiment, const std::string& source, const Console& console);
 
 /// Creates the folder of an output file set. Errors: file_unwritable. [main]
 Status make_output_folder(const std::string& folder);

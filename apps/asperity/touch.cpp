@@ -26,18 +26,6 @@ struct TouchOptions {
   bool csv = false;
 };
 
-TraceMetadata metadata_of(const Experiment& experiment, const TouchOptions& options, const Console& console) {
-  TraceMetadata metadata;
-  metadata.scene = experiment.canonical_json;
-  metadata.source = options.scene.scene;
-  metadata.command = console.command_line;
-  metadata.device = experiment.device.name;
-  metadata.program = program_name();
-  metadata.rate = experiment.rate;
-  metadata.seed = experiment.simulated.seed;
-  return metadata;
-}
-
 /// A trace that grows beside its place and moves there when it is whole.
 class TraceOutput {
  public:
@@ -166,7 +154,7 @@ void print_summary(const Experiment& experiment, const RunResult& run, const Run
 Status write_outputs(const Experiment& experiment, const RunResult& run, const RunReport& report,
                      const TouchOptions& options, const TraceMetadata& metadata, const fs::path& folder, Json& files) {
   if (options.csv) {
-    const Trace trace{metadata, run.records, true, 0, {}};
+    const Trace trace{metadata, run.records, true, 0, {}, {}, {}};
     ASPERITY_CHECK(export_trace(trace, (folder / "trace.csv").string()));
     files["csv"] = (folder / "trace.csv").string();
   }
@@ -189,7 +177,7 @@ Result<int> touch(const TouchOptions& options, const Console& console) {
   const fs::path folder = options.out.empty() ? fs::path("out") / folder_name(experiment.name) : fs::path(options.out);
   ASPERITY_CHECK(check_length(experiment));
   ASPERITY_CHECK(make_output_folder(folder.string()));
-  const TraceMetadata metadata = metadata_of(experiment, options, console);
+  const TraceMetadata metadata = trace_metadata(experiment, options.scene.scene, console);
   const std::string trace_path = (folder / "trace.asptrace").string();
   ASPERITY_TRY(TraceOutput trace, TraceOutput::open(trace_path, metadata));
   Result<RunResult> run = run_experiment(

@@ -92,6 +92,24 @@ void SimulatedDevice::apply(const Vec3& force, Seconds dt) noexcept {
   }
 }
 
+/// Where the stroke is now; on the way back it is as when time runs backwards.
+StrokePose SimulatedDevice::pose() const noexcept {
+  const double duration = path_.duration().count();
+  if (!settings_.back_and_forth || !(duration > 0.0)) return path_.pose(Seconds(time_));
+  const double within = std::fmod(time_, 2.0 * duration);
+  if (within <= duration) return path_.pose(Seconds(within));
+  StrokePose pose = path_.pose(Seconds(2.0 * duration - within));
+  pose.tangent = -pose.tangent;
+  pose.velocity = -pose.velocity;
+  pose.normal_rate = -pose.normal_rate;
+  if (pose.phase == StrokePhase::approach) {
+    pose.phase = StrokePhase::lift;
+  } else if (pose.phase != StrokePhase::contact) {
+    pose.phase = StrokePhase::approach;
+  }
+  return pose;
+}
+
 void SimulatedDevice::update_normal_mode(const StrokePose& pose, double h) noexcept {
   const bool pressing = path_.press() == PressMode::force && pose.phase == StrokePhase::contact;
   const double wanted = pressing ? path_.normal_force() : 0.0;
@@ -123,7 +141,7 @@ SimulatedDevice::Drive SimulatedDevice::drive(const StrokePose& pose, const Vec3
 // mass plus what spring and dampers add over one step; it differs along the normal when the hand presses instead of
 // aiming.
 void SimulatedDevice::substep(const Vec3& force, double h) noexcept {
-  const StrokePose pose = path_.pose(Seconds(time_));
+  const StrokePose pose = this->pose();
   update_normal_mode(pose, h);
   const Vec3& n = pose.normal;
   aim_ = pose.target + tremor_offset(time_) + (lifting_ ? lift_offset_ : 0.0) * n;

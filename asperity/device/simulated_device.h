@@ -18,6 +18,8 @@ struct SimulatedDeviceSettings {
   double tremor = 0.0;           ///< RMS of the hand's tremor (m), each axis, 8 to 12 Hz; 0: none
   std::uint64_t seed = 1;        ///< of the tremor
   double max_substep = 50e-6;    ///< longest integration step (s), above 0
+  /// At its end the hand goes the stroke back, and so on: such a device never has finished.
+  bool back_and_forth = false;
 };
 
 /// A hand that holds a device: the closed loop that a renderer meets in life. Deterministic. [servo]
@@ -44,7 +46,7 @@ class SimulatedDevice {
   /// Holds `force` for `dt` and advances. A force that is not finite counts as zero: the safety stage never sends one.
   void apply(const Vec3& force, Seconds dt) noexcept;
   [[nodiscard]] Vec3 aim() const noexcept { return aim_; }
-  [[nodiscard]] bool finished() const noexcept { return time_ > path_.duration().count(); }
+  [[nodiscard]] bool finished() const noexcept { return !settings_.back_and_forth && time_ > path_.duration().count(); }
 
   [[nodiscard]] const StrokePath& path() const noexcept { return path_; }
   [[nodiscard]] const DeviceProfile& profile() const noexcept { return profile_; }
@@ -69,6 +71,7 @@ class SimulatedDevice {
 
   SimulatedDevice(StrokePath path, const DeviceProfile& profile, const HandImpedance& hand,
                   const SimulatedDeviceSettings& settings);
+  [[nodiscard]] StrokePose pose() const noexcept;
   [[nodiscard]] Drive drive(const StrokePose& pose, const Vec3& force) const noexcept;
   void substep(const Vec3& force, double h) noexcept;
   void update_normal_mode(const StrokePose& pose, double h) noexcept;

@@ -57,7 +57,7 @@ class TelemetryReader {
     std::swap(batch, coming_);
     return !batch.ticks.empty() || !ended_;
   }
-  /// Ticks that found no room. [any]
+  /// Ticks that have not come to this reader: that it, or the hub, had no room for. [any]
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }
 
   // --- the hub's ---
@@ -83,13 +83,12 @@ class TelemetryReader {
   static constexpr std::size_t most_key_frames = 64;
 
   void put(const TelemetryTick& tick) {
-    if (coming_.ticks.size() >= most_) {
-      ++skipped_;
-      lost_.fetch_add(1, std::memory_order_relaxed);
-      return;
-    }
+    const bool room = coming_.ticks.size() < most_;
+    lost_.fetch_add(tick.lost + (room ? 0 : 1), std::memory_order_relaxed);
+    skipped_ += tick.lost + (room ? 0 : 1);
+    if (!room) return;
     coming_.ticks.push_back(tick);
-    coming_.ticks.back().lost += std::exchange(skipped_, 0);
+    coming_.ticks.back().lost = std::exchange(skipped_, 0);
   }
 
   std::size_t most_;
@@ -121,7 +120,7 @@ class Telemetry {
   Telemetry(const Telemetry&) = delete;
   Telemetry& operator=(const Telemetry&) = delete;
 
-  /// A reader of its own, from now on, with room for so many ticks. [main]
+  /// A reader of its own, from now on and for as long as it is kept, with room for so many ticks. [main]
   std::shared_ptr<TelemetryReader<State>> read(std::size_t most) {
     auto reader = std::make_shared<TelemetryReader<State>>(most);
     const std::lock_guard lock(mutex_);
@@ -156,6 +155,7 @@ class Telemetry {
 
   void hand_to_all(const Batch& batch, bool last) {
     const std::lock_guard lock(mutex_);
+    std::erase_if(readers_, [](const auto& reader) { return reader.use_count() == 1; });
     for (const auto& reader : readers_) {
       if (!batch.ticks.empty() || !batch.key_frames.empty()) reader->put(batch);
       if (last) reader->end();

@@ -143,6 +143,46 @@ TEST(SimulatedDevice, FreeMotionTracksTheStroke) {
   EXPECT_LT(worst, 0.028 / std::sqrt(400.0 / 0.15));
 }
 
+TEST(SimulatedDevice, GoesItsStrokeBackAndForth) {
+  for (const PressMode press : {PressMode::depth, PressMode::force}) {
+    StrokeSettings s = line_settings();
+    s.press = press;
+    const StrokePath path = build_stroke(s, on_plane).value();
+    const double duration = path.duration().count();
+    const auto dt = Seconds(1e-3);
+    SimulatedDevice device = device_on(path, bare_profile(), {.back_and_forth = true});
+    SimulatedDevice once = device_on(path, bare_profile());
+    double fastest = 0.0;
+    double worst = 0.0;
+    int contacts = 0;
+    bool pressed = false;
+    Vec3 before = device.position();
+    for (double time = 0.0; time < 6.0 * duration; time += dt.count()) {
+      // The plane pushes back; a hand that presses would go through it else.
+      const Vec3& p = device.position();
+      const Vec3 push(0.0, std::max(0.0, -1000.0 * p.y()), 0.0);
+      contacts += !pressed && push.y() > 0.0 ? 1 : 0;
+      pressed = push.y() > 0.0 || (pressed && p.y() < 1e-3);
+      if (time < duration - 2.0 * dt.count()) {
+        once.apply(push, dt);
+        device.apply(push, dt);
+        ASSERT_EQ(device.position(), once.position()) << "the first way is the stroke's own";
+      } else {
+        device.apply(push, dt);
+      }
+      ASSERT_FALSE(device.finished());
+      fastest = std::max(fastest, (device.position() - before).norm() / dt.count());
+      before = device.position();
+      const double within = std::fmod(time + dt.count(), 2.0 * duration);
+      const double there = std::min(within, 2.0 * duration - within);
+      if (press == PressMode::depth) worst = std::max(worst, (device.aim() - path.pose(Seconds(there)).target).norm());
+    }
+    EXPECT_LT(fastest, 0.2) << "no leap at either end";
+    EXPECT_LT(worst, 1e-4);
+    EXPECT_EQ(contacts, 6) << "each way it comes down and is lifted off again";
+  }
+}
+
 TEST(SimulatedDevice, HeldForceDeflectsTheHandByItsStiffness) {
   StrokeSettings s = line_settings(0.2);
   SimulatedDevice device = device_on(build_stroke(s, on_plane).value(), bare_profile());

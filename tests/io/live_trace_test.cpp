@@ -12,6 +12,7 @@
 #include "asperity/device/ideal_probe.h"
 #include "asperity/device/simulated_device.h"
 #include "asperity/io/experiment.h"
+#include "asperity/render/law_registry.h"
 #include "asperity/render/state_image.h"
 #include "asperity/render/step.h"
 #include "asperity/servo/session.h"

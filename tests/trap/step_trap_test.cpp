@@ -7,8 +7,10 @@
 
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <cstdarg>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 
@@ -19,6 +21,7 @@
 #include "asperity/render/step.h"
 #include "tests/field/sparse_grids.h"
 #include "tests/field/volumes.h"
+#include "tests/trap/trap.h"
 
 namespace {
 
@@ -66,6 +69,16 @@ int pthread_mutex_lock(pthread_mutex_t* mutex) {
   static auto* real = next<int(pthread_mutex_t*)>("pthread_mutex_lock");
   return real(mutex);
 }
+int pthread_cond_signal(pthread_cond_t* condition) {
+  count(locks);
+  static auto* real = next<int(pthread_cond_t*)>("pthread_cond_signal");
+  return real(condition);
+}
+int pthread_cond_broadcast(pthread_cond_t* condition) {
+  count(locks);
+  static auto* real = next<int(pthread_cond_t*)>("pthread_cond_broadcast");
+  return real(condition);
+}
 int open(const char* path, int flags, ...) {
   count(files);
   va_list arguments;
@@ -88,20 +101,32 @@ void __cxa_throw(void* object, void* type, void (*destroy)(void*)) {  // NOLINT
 }
 }
 
+namespace asperity::trap {
+
+void arm(bool on) noexcept {
+  armed = on;
+}
+Counts counts() noexcept {
+  return {allocations, locks, throws, files};
+}
+void forget() noexcept {
+  allocations = locks = throws = files = 0;
+}
+
+}  // namespace asperity::trap
+
 namespace asperity::step_trap_test {
 namespace {
 
-struct Counts {
-  int allocations, locks, throws, files;
-};
+using trap::Counts;
 
 template <class F>
 Counts trapped(F&& work) {
-  allocations = locks = throws = files = 0;
-  armed = true;
+  trap::forget();
+  trap::arm(true);
   work();
-  armed = false;
-  return {allocations, locks, throws, files};
+  trap::arm(false);
+  return trap::counts();
 }
 
 TEST(Trap, CatchesWhatItShould) {
@@ -109,9 +134,11 @@ TEST(Trap, CatchesWhatItShould) {
   GTEST_SKIP() << "sanitizers replace the same functions";
 #endif
   std::mutex mutex;
+  std::condition_variable told;
   const Counts counts = trapped([&] {
     std::vector<int> grown(100);
     const std::lock_guard<std::mutex> guard(mutex);
+    told.notify_one();
     EXPECT_EQ(::write(-1, "", 0), -1);
     try {
       throw std::runtime_error("expected");
@@ -119,9 +146,13 @@ TEST(Trap, CatchesWhatItShould) {
     }
   });
   EXPECT_GE(counts.allocations, 2);
-  EXPECT_GE(counts.locks, 1);
+  EXPECT_GE(counts.locks, 2);
   EXPECT_GE(counts.throws, 1);
   EXPECT_GE(counts.files, 1);
+  // What a shared pointer that threads share would do.
+  std::shared_ptr<int> shared = std::make_shared<int>(1);
+  const Counts by_pointer = trapped([&] { static_cast<void>(*std::atomic_load(&shared)); });
+  EXPECT_GE(by_pointer.locks, 1);
 }
 
 Scene scene_with(const Law& law, SearchStructure structure, double probe_radius) {
