@@ -96,14 +96,14 @@ SharedBoard::~SharedBoard() {
   ::munmap(layout_, sizeof(Layout));
 }
 
-PortReading SharedBoard::read() noexcept {
+std::optional<PortReading> SharedBoard::read() const noexcept {
   DeviceWord word;
-  if (layout_->device.get(word)) last_reading_ = reading_of(word);
-  return last_reading_;
+  if (!layout_->device.get(word)) return std::nullopt;
+  return reading_of(word);
 }
 
-void SharedBoard::write(const Vec3& force) noexcept {
-  layout_->loop.put({++beat_, last_reading_.released, numbers(force)});
+void SharedBoard::ask(const Asked& asked) noexcept {
+  layout_->loop.put({asked.beat, asked.released, numbers(asked.force)});
 }
 
 void SharedBoard::halt() noexcept {
@@ -115,16 +115,17 @@ void SharedBoard::resume() noexcept {
 void SharedBoard::close() noexcept {
   layout_->closed.store(1, std::memory_order_release);
 }
+bool SharedBoard::halted() const noexcept {
+  return layout_->halted.load(std::memory_order_acquire) != 0;
+}
+bool SharedBoard::closed() const noexcept {
+  return layout_->closed.load(std::memory_order_acquire) != 0;
+}
 
-SharedBoard::Asked SharedBoard::asked() noexcept {
-  if (LoopWord word; layout_->loop.get(word)) {
-    last_asked_.beat = word.beat;
-    last_asked_.released = word.released;
-    last_asked_.force = vector(word.force);
-  }
-  last_asked_.halted = layout_->halted.load(std::memory_order_acquire) != 0;
-  last_asked_.closed = layout_->closed.load(std::memory_order_acquire) != 0;
-  return last_asked_;
+std::optional<SharedBoard::Asked> SharedBoard::asked() const noexcept {
+  LoopWord word;
+  if (!layout_->loop.get(word)) return std::nullopt;
+  return Asked{word.beat, vector(word.force), word.released};
 }
 
 void SharedBoard::tell(const PortReading& reading) noexcept {

@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "asperity/core/result.h"
@@ -70,22 +72,25 @@ class SharedBoard {
   SharedBoard& operator=(const SharedBoard&) = delete;
 
   // --- the loop's side ---
-  [[nodiscard]] PortReading read() noexcept;
-  void write(const Vec3& force) noexcept;
+  /// What the device has told last; nothing where it is in the middle of it.
+  [[nodiscard]] std::optional<PortReading> read() const noexcept;
+  /// What a loop asks for.
+  struct Asked {
+    std::uint64_t beat = 0;  ///< the loop's count of what it asked; 0: nothing yet
+    Vec3 force = Vec3::Zero();
+    std::uint64_t released = 0;  ///< PortReading::released, as the loop knew it when it sent this
+  };
+  void ask(const Asked& asked) noexcept;
   void halt() noexcept;
   void resume() noexcept;
   /// The device is to end.
   void close() noexcept;
 
   // --- the device's ---
-  struct Asked {
-    std::uint64_t beat = 0;  ///< 0: nothing yet
-    Vec3 force = Vec3::Zero();
-    std::uint64_t released = 0;  ///< PortReading::released, as the loop knew it when it sent this
-    bool halted = false;
-    bool closed = false;
-  };
-  [[nodiscard]] Asked asked() noexcept;
+  /// Nothing where the loop is in the middle of it.
+  [[nodiscard]] std::optional<Asked> asked() const noexcept;
+  [[nodiscard]] bool halted() const noexcept;
+  [[nodiscard]] bool closed() const noexcept;
   void tell(const PortReading& reading) noexcept;
   void put_out(const PutOut& put) noexcept;
 
@@ -97,23 +102,24 @@ class SharedBoard {
   struct Layout;
   explicit SharedBoard(Layout* layout) noexcept : layout_(layout) {}
   Layout* layout_;
-  // What was read last, for when the other side is in the middle of writing: of the loop's, and of the device's.
-  PortReading last_reading_;
-  Asked last_asked_;
-  std::uint64_t beat_ = 0;
 };
 
-/// The loop's side of a board, to be copied as ports are.
+/// The loop's end of a board. [servo]
 class SharedPort {
  public:
   explicit SharedPort(std::shared_ptr<SharedBoard> board) noexcept : board_(std::move(board)) {}
-  [[nodiscard]] PortReading read() noexcept { return board_->read(); }
-  void write(const Vec3& force) noexcept { board_->write(force); }
+  [[nodiscard]] PortReading read() noexcept {
+    last_ = board_->read().value_or(last_);
+    return last_;
+  }
+  void write(const Vec3& force) noexcept { board_->ask({++beat_, force, last_.released}); }
   void halt() noexcept { board_->halt(); }
   void resume() noexcept { board_->resume(); }
 
  private:
   std::shared_ptr<SharedBoard> board_;
+  PortReading last_;
+  std::uint64_t beat_ = 0;
 };
 static_assert(Port<SharedPort>);
 

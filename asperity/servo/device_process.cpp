@@ -50,7 +50,7 @@ void DeviceProcess::leave() noexcept {
 
 Status DeviceProcess::wait_for_first(SharedBoard& board) {
   for (int i = 0; i < 5000; ++i) {
-    if (board.read().beat > 0) return success();
+    if (board.read().value_or(PortReading{}).beat > 0) return success();
     sleep_a_millisecond();
   }
   return Error{ErrorCode::mismatch, "has not told a sample within 5 s", {}, "device", "a device that answers"};

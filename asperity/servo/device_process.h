@@ -32,15 +32,17 @@ void run_device(SharedBoard& board, D& device, PeriodicClock<Time> clock, const 
   // A quarter of a period is left for clocks that do not beat together.
   const Seconds longest((settings.silent_periods - 0.25) / settings.loop_rate);
   PortReading told;
+  SharedBoard::Asked asked;
   std::uint64_t heard = 0;
   Seconds silent{0.0};
   bool holds = false;
   for (bool goes_on = true; goes_on;) {
     const LoopTick tick = clock.wait();
-    const SharedBoard::Asked asked = board.asked();
+    asked = board.asked().value_or(asked);
+    const bool closed = board.closed();
     silent = asked.beat == heard ? silent + tick.dt : Seconds(0.0);
     heard = asked.beat;
-    const bool lets_go = asked.halted || asked.closed || silent > longest;
+    const bool lets_go = board.halted() || closed || silent > longest;
     if (lets_go && holds) ++told.released;
     const Vec3 force = lets_go || asked.released != told.released ? Vec3(Vec3::Zero()) : asked.force;
     holds = !force.isZero(0.0);
@@ -50,7 +52,7 @@ void run_device(SharedBoard& board, D& device, PeriodicClock<Time> clock, const 
     told.probe = device.read();
     told.finished = std::as_const(device).finished();
     board.tell(told);
-    goes_on = !asked.closed && silent < settings.leaves_after;
+    goes_on = !closed && silent < settings.leaves_after;
   }
 }
 

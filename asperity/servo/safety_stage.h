@@ -68,7 +68,7 @@ struct SafetyOutput {
 /// All that a safety stage carries from tick to tick.
 struct SafetyMemory {
   Vec3 last_force = Vec3::Zero();  ///< N, world: sent at the last tick
-  Seconds engaged{0.0};      ///< since it was armed
+  Seconds engaged{0.0};            ///< since it was armed
   Fault fault = Fault::none;
   bool raised = false;  ///< the fault stays although nothing latches
   bool armed = false;
