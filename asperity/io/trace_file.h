@@ -136,8 +136,8 @@ struct Trace {
   bool complete = false;         ///< the end frame was there and agrees
   std::uint64_t lost_bytes = 0;  ///< at the end of the file, behind the last good frame
   std::string damage;            ///< empty when complete; else one sentence saying what and at which byte
-  std::vector<TraceEvent> events;
-  std::vector<TraceKeyFrame> key_frames;
+  std::vector<TraceEvent> events = {};
+  std::vector<TraceKeyFrame> key_frames = {};
 };
 
 /// Reads a trace. Frames are taken up to the first one that is cut or damaged; what follows is counted in `lost_bytes`

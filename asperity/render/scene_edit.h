@@ -44,9 +44,9 @@ struct SceneEdit {
 };
 
 /// The scene with that change, all of it or none. It shares its surfaces with `scene`, so that a probe that touches one
-/// goes on; it takes a few microseconds, but for the law dense-mesh, which makes its mesh. Errors, with the instance's
-/// name and the kind as place: bad_value (no such instance, a value that Scene::build refuses), unsupported_pair (a
-/// threshold of what has none, a law that does not feel the surface). [build]
+/// goes on; it takes some ten microseconds, but for the law dense-mesh, which makes its mesh. Errors, with the
+/// instance's name and the kind as place: bad_value (no such instance, a value that Scene::build refuses),
+/// unsupported_pair (a threshold of what has none, a law that does not feel the surface). [build]
 Result<Scene> edited(const Scene& scene, const SceneEdit& edit);
 
 /// An edit as people write it: "stiffness=800", "dragon.stiffness=0.5N/mm", "zoom=2", "law=height-field",
