@@ -14,6 +14,7 @@
 
 #include "apps/asperity/feature_facts.h"
 #include "apps/asperity/feel.h"
+#include "apps/asperity/inspect_trace.h"
 #include "apps/asperity/relief_advice.h"
 #include "apps/asperity/run.h"
 #include "apps/asperity/scene_argument.h"
@@ -34,6 +35,7 @@ namespace fs = std::filesystem;
 struct InspectOptions {
   std::string file;
   SceneArgument scene;
+  std::string report;     ///< page of a trace's last ticks; empty: none is written
   double friction = 0.2;  ///< of the smooth material of a map or of a scene's features
 };
 
@@ -41,10 +43,13 @@ struct InspectOptions {
 struct Findings {
   std::string kind;
   std::vector<ReportFact> facts;
-  std::vector<std::string> problems;  ///< what is wrong with it
-  std::vector<std::string> felt;      ///< what can be felt of it
-  Json features = Json::array();      ///< of a scene: its fine features in numbers
-  std::vector<ReliefAdvice> reliefs;  ///< whether they can be felt as they are
+  std::vector<std::string> problems;       ///< what is wrong with it
+  std::vector<std::string> felt;           ///< what can be felt of it
+  Json features = Json::array();           ///< of a scene: its fine features in numbers
+  std::vector<ReliefAdvice> reliefs;       ///< whether they can be felt as they are
+  std::vector<std::string> happened = {};  ///< of a trace, between its ticks
+  std::vector<std::string> last = {};      ///< of a trace that a fault has left: its last ticks
+  Json trace = Json::object();             ///< of a trace
   void fact(std::string name, std::string value) { facts.push_back({std::move(name), std::move(value)}); }
 };
 
@@ -71,21 +76,11 @@ void mesh_facts(const TriangleMesh& mesh, Findings& found) {
 }
 
 Result<Findings> inspect_trace(const std::string& file) {
-  ASPERITY_TRY(const Trace trace, read_trace(file));
-  Findings found{"trace", {}, {}, {}, Json::array(), {}};
-  found.fact("ticks", fmt::format("{} at {:g} Hz", trace.records.size(), trace.metadata.rate));
-  found.fact("written by", trace.metadata.program);
-  found.fact("command", trace.metadata.command);
-  found.fact("device", trace.metadata.device);
-  found.fact("force hash", format_hash(force_hash(trace.records)));
-  double largest = 0.0;
-  std::size_t contact = 0;
-  for (const TraceRecord& record : trace.records) {
-    largest = std::max(largest, record.commanded.norm());
-    contact += record.rendered.flags.has(TickFlag::contact) ? 1U : 0U;
-  }
-  found.fact("in contact", fmt::format("{} ticks, at most {:.3g} N", contact, largest));
-  if (!trace.complete) found.problems.push_back("not whole: " + trace.damage);
+  ASPERITY_TRY(TraceFindings trace, inspect_trace_file(file));
+  Findings found{"trace", std::move(trace.facts), std::move(trace.problems), {}, Json::array(), {}};
+  found.happened = std::move(trace.happened);
+  found.last = std::move(trace.last);
+  found.trace = std::move(trace.json);
   return found;
 }
 
@@ -452,6 +447,10 @@ Result<Findings> inspect_any(InspectOptions options, const Progress& progress) {
 void print_findings(const std::string& file, const Findings& found) {
   std::cout << fmt::format("{}: a {}\n", file, found.kind);
   for (const ReportFact& fact : found.facts) std::cout << fmt::format("  {}: {}\n", fact.name, fact.value);
+  if (!found.last.empty()) std::cout << "The last ticks:\n";
+  for (const std::string& line : found.last) std::cout << "  " << line << '\n';
+  if (!found.happened.empty()) std::cout << "What happened:\n";
+  for (const std::string& line : found.happened) std::cout << "  " << line << '\n';
   if (!found.problems.empty()) std::cout << "To know:\n";
   for (const std::string& problem : found.problems) std::cout << "  - " << problem << '\n';
   if (!found.felt.empty()) std::cout << "What can be felt:\n";
@@ -467,6 +466,12 @@ void print_findings(const std::string& file, const Findings& found) {
 
 Result<int> inspect(const InspectOptions& options, const Console& console) {
   ASPERITY_TRY(const Findings found, inspect_any(options, console.progress()));
+  if (!options.report.empty()) {
+    if (found.kind != "trace")
+      return bad_value("writes a page of a trace, and this is a " + found.kind, "--report", "a trace")
+          .in_file(options.file);
+    ASPERITY_CHECK(write_trace_report(options.file, options.report, console));
+  }
   if (console.json) {
     Json facts = Json::object();
     for (const ReportFact& fact : found.facts) facts[fact.name] = fact.value;
@@ -475,6 +480,7 @@ Result<int> inspect(const InspectOptions& options, const Console& console) {
                   {"facts", facts},
                   {"to_know", found.problems},
                   {"felt", found.felt}};
+    for (const auto& [key, value] : found.trace.items()) document[key] = value;
     if (!found.features.empty()) document["features"] = found.features;
     for (const ReliefAdvice& advice : found.reliefs) document["reliefs"].push_back(advice_json(advice));
     console.print(document);
@@ -509,6 +515,7 @@ void add_inspect(Arguments& program, Console& console, Action& action) {
   command.option("--stiffness", options->scene.stiffness, "To judge by: 1000, 0.5N/mm");
   command.option("--speed", options->scene.speed, "Of the hand: 20mm/s");
   command.option("--force", options->scene.force, "Of the hand: 1N");
+  command.option("--report", options->report, "Of a trace: write a page with plots of its last two seconds here");
   add_console_options(command, console);
   command.closing_words(
       "Of a relief: whether it can be felt as it is, criterion by criterion (docs/methods/renderability.md), the "
@@ -519,7 +526,8 @@ void add_inspect(Arguments& program, Console& console, Action& action) {
       "  asperity inspect M_b-H_1 --device phantom-desktop --force 0.5N --speed 10mm/s\n"
       "  asperity inspect rock.png --height 1mm --tile 30mm --device touch\n"
       "  asperity inspect kitchen.vtk\n"
-      "  asperity inspect out/icosphere-relief/trace.asptrace --json");
+      "  asperity inspect out/icosphere-relief/trace.asptrace --json\n"
+      "  asperity inspect fault.asptrace --report fault.html");
   command.when_called(
       [options, &console, &action] { action = [options, &console] { return inspect(*options, console); }; });
 }
