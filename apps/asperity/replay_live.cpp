@@ -29,7 +29,7 @@ bool equal_bits(const Vec3& a, const Vec3& b) noexcept {
 }
 
 /// Renders one record after the other, whatever the loop says that the probe and the length of the tick are.
-struct LiveStep {
+struct ReplayStep {
   const Trace* trace;
   const Timeline* timeline;
   TracePlayer player;
@@ -74,7 +74,7 @@ Json times_json(const TimeCounts& times) {
 }  // namespace
 
 Result<int> replay_live(const std::string& path, const Trace& trace, const Timeline& timeline, const Console& console) {
-  using Loop = ServoThread<Timeline, LiveStep, ReplayDevice, DropRecord>;
+  using Loop = ServoThread<Timeline, ReplayStep, ReplayDevice, DropRecord>;
   std::vector<ProbeSample> probes;
   for (const TraceRecord& record : trace.records) probes.push_back(record.probe);
   ASPERITY_TRY(ReplayDevice device, ReplayDevice::build(std::move(probes)));
@@ -87,7 +87,7 @@ Result<int> replay_live(const std::string& path, const Trace& trace, const Timel
   const Progress progress = console.progress();
   Result<std::unique_ptr<Loop>> started =
       Loop::start(std::shared_ptr<const Timeline>(std::shared_ptr<void>(), &timeline),
-                  LiveStep{&trace, &timeline, std::move(player), findings}, std::move(device), {}, settings);
+                  ReplayStep{&trace, &timeline, std::move(player), findings}, std::move(device), {}, settings);
   if (!started) return std::move(started).error().in_file(path);
   Loop& loop = **started;
   while (!loop.ended()) {

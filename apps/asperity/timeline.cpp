@@ -187,14 +187,13 @@ void TracePlayer::happen(const Happening& happening) noexcept {
     case Happening::What::raise: safety_.raise(happening.fault); break;
     case Happening::What::acknowledge: safety_.acknowledge(); break;
     case Happening::What::released: safety_.released(); break;
-    case Happening::What::stopping: stopping_ = true; break;
+    case Happening::What::stopping: safety_.withhold(); break;
     case Happening::What::gap:
     case Happening::What::key_frame: break;
   }
 }
 
 Status TracePlayer::fetch(const TraceRecord& record) {
-  if (stopping_) return success();
   // What was in memory then is what is felt now.
   state_.wanted_level = record.rendered.level;
   return fetch_volumes(*scene_, state_, record.probe);
@@ -203,10 +202,8 @@ Status TracePlayer::fetch(const TraceRecord& record) {
 TracePlayer::Answer TracePlayer::render(const TraceRecord& record) noexcept {
   Answer answer;
   if (!knows_) return answer;
-  if (!stopping_) {
-    state_.wanted_level = record.rendered.level;
-    answer.rendered = step(*scene_, state_, caches_[cache_], record.probe, record.dt);
-  }
+  state_.wanted_level = record.rendered.level;
+  answer.rendered = step(*scene_, state_, caches_[cache_], record.probe, record.dt);
   answer.commanded = safety_.apply(answer.rendered, record.probe, record.dt).force;
   return answer;
 }

@@ -22,7 +22,7 @@ struct Happening {
     raise,        ///< `fault` was seen
     acknowledge,  ///< of that
     released,     ///< the device let go by itself
-    stopping,     ///< from here on nothing is rendered: the force is ramped down
+    stopping,     ///< from here on the force is withheld
     gap,          ///< `lost` ticks are missing: what the probe carried is not known
     key_frame,    ///< number `key`, and `state` is what the probe carried
   };
@@ -87,7 +87,6 @@ class TracePlayer {
   ProxyState state_;
   SafetyStage safety_;
   bool knows_ = false;
-  bool stopping_ = false;
 };
 
 }  // namespace asperity::program

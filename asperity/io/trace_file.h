@@ -71,7 +71,7 @@ std::string to_json(const TraceMetadata& metadata);
 ///   "raise"        a fault that the loop has seen: its name
 ///   "acknowledge"  of that
 ///   "released"     the device has let go of the force by itself: the safety stage's last one counts as zero
-///   "stopping"     from here on nothing is rendered, the force is ramped down: what ServoThread's last ticks are
+///   "stopping"     from here on the safety stage withholds the force: what ServoThread's last ticks are
 ///   "lost"         a gap before this tick: how many ticks the recorder could not keep
 ///   "note"         for people
 struct TraceEvent {

@@ -74,7 +74,7 @@ class Session {
     tell("released");
   }
   void stop() {
-    stopping_ = true;
+    safety_.withhold();
     tell("stopping");
   }
   void key_frame() { ASSERT_TRUE(writer_->key_frame({tick_, save_loop_state(state_, safety_.memory(), scene_)}).ok()); }
@@ -87,7 +87,7 @@ class Session {
       record.probe = probe_.read();
       // It leaves the surface now and then: only a free tick lets force in again.
       if (record.tick % 200 >= 32 && record.tick % 200 < 50) record.probe.pose.position.y() += 5e-3;
-      if (!stopping_) record.rendered = step(scene_, state_, cache_, record.probe, record.dt);
+      record.rendered = step(scene_, state_, cache_, record.probe, record.dt);
       record.commanded = safety_.apply(record.rendered, record.probe, record.dt).force;
       probe_.apply(record.commanded, record.dt);
       felt_ = felt_ || !record.commanded.isZero(0.0);
@@ -109,7 +109,6 @@ class Session {
   ProxyCache cache_;
   std::optional<TraceWriter> writer_;
   std::uint64_t tick_ = 0;
-  bool stopping_ = false;
   bool felt_ = false;
 };
 
@@ -383,6 +382,58 @@ TEST_F(LiveReplay, InspectTellsWhatHappenedAndOfAFaultItsSentenceFirst) {
   const Answer other = run("inspect icosphere --report page.html");
   EXPECT_EQ(other.code, 2);
   EXPECT_FALSE(fs::exists(at("page.html")));
+}
+
+// --- asperity run ---
+
+TEST_F(LiveReplay, WhatRunHasRecordedReplaysBitEqual) {
+  const Answer ran =
+      run("run icosphere --seconds 1.3 --priority 0 --edit 300ms:stiffness=300 --edit 600ms:zoom=2 --out o");
+  ASSERT_EQ(ran.code, 0) << ran.err << ran.out;
+  for (const char* part : {"ticks    1", "scenes   3 handed over, 3 felt", "faults   none", "0 lost"})
+    EXPECT_TRUE(has(ran.out, part)) << part << ran.out;
+  const Answer again = run("replay o/live.asptrace");
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_TRUE(has(again.out, "every force bit-equal")) << again.out;
+  EXPECT_TRUE(has(again.out, "1 key frames, each goes on bit-equal")) << again.out;
+}
+
+TEST_F(LiveReplay, ARunThatIsInterruptedEndsInGoodOrder) {
+  for (const char* signal : {"INT", "TERM"}) {
+    const Answer ran = run(
+        std::string("run icosphere --seconds 60 --priority 0 --json --out o > out.txt 2> err.txt & sleep 1.5; kill -") +
+        signal + " $!; wait $!");
+    EXPECT_EQ(ran.code, 0) << read("err.txt");
+    EXPECT_TRUE(json::accept(read("out.txt"))) << read("out.txt");
+    const Answer again = run("replay o/live.asptrace");
+    EXPECT_EQ(again.code, 0) << "the recording is whole" << again.err;
+  }
+}
+
+TEST_F(LiveReplay, ADeviceThatIsKilledEndsTheRunAndLeavesItsLastSeconds) {
+  const Answer ran = run(
+      "run icosphere --seconds 60 --priority 0 --out o > out.txt 2> err.txt & sleep 1.5; pkill -KILL -P $!; wait $!");
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_TRUE(has(read("err.txt"), "fault: the device no longer answers")) << read("err.txt");
+  const Answer told = run("inspect o/fault-1.asptrace");
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_TRUE(has(told.out, "fault: the device no longer answers")) << told.out;
+  EXPECT_EQ(run("replay o/fault-1.asptrace").code, 0);
+}
+
+TEST_F(LiveReplay, RunRefusesWhatItCannotDo) {
+  const auto refused = [&](const std::string& arguments, const char* part) {
+    const Answer answer = run("run icosphere --out o " + arguments);
+    EXPECT_EQ(answer.code, 2) << arguments;
+    EXPECT_TRUE(has(answer.err, part)) << answer.err;
+    EXPECT_FALSE(fs::exists(folder_ / "o" / "live.asptrace")) << arguments;
+  };
+  refused("--device haply:inverse3", "simulated:PROFILE");
+  refused("--device simulated:omega.8", "omega.7");
+  refused("--edit stiffness=3", "2s:stiffness=800");
+  refused("--edit 1s:stiffness=-3", "above 0");
+  refused("--edit 1s:cube.stiffness=3", "cube");
+  refused("--rate 100", "500 Hz to 40 kHz");
 }
 
 }  // namespace
