@@ -20,13 +20,18 @@ class RingQueue {
 
   /// False where there is no room. [servo]
   bool push(const T& value) noexcept {
+    return push_with([&](T& slot) noexcept { slot = value; });
+  }
+  /// fill(slot) where there is room: whatever was in the slot before is to be written over. [servo]
+  template <class Fill>
+  bool push_with(Fill&& fill) noexcept {
     const std::uint64_t end = end_.load(std::memory_order_relaxed);
     // The other thread's line is read only once what was seen of it is used up.
     if (end - seen_first_ > mask_) {
       seen_first_ = first_.load(std::memory_order_acquire);
       if (end - seen_first_ > mask_) return false;
     }
-    slots_[end & mask_] = value;
+    fill(slots_[end & mask_]);
     end_.store(end + 1, std::memory_order_release);
     return true;
   }

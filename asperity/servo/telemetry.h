@@ -138,8 +138,14 @@ class Telemetry {
   /// A tick, with the state after it. [servo]
   template <class Felt, class Step>
   void put(const LiveTick<Felt, Step>& tick, std::uint64_t scene, const State& state) noexcept {
-    waiting_ = {tick.record, tick.notes, tick.safety.fault(), scene, skipped_};
-    if (ticks_.push(waiting_)) {
+    const bool has_room = ticks_.push_with([&](TelemetryTick& slot) noexcept {
+      slot.record = tick.record;
+      slot.notes = tick.notes;
+      slot.fault = tick.safety.fault();
+      slot.scene = scene;
+      slot.lost = skipped_;
+    });
+    if (has_room) {
       skipped_ = 0;
     } else {
       ++skipped_;
@@ -179,8 +185,7 @@ class Telemetry {
   RingQueue<TelemetryTick> ticks_;
   RingQueue<TelemetryKeyFrame<State>> key_frames_;
   std::uint64_t key_frame_every_;
-  TelemetryTick waiting_;      ///< the servo thread's
-  std::uint64_t skipped_ = 0;  ///< likewise
+  std::uint64_t skipped_ = 0;  ///< the servo thread's
   std::atomic<std::uint64_t> lost_ = 0;
   std::atomic<bool> ending_ = false;
   std::mutex mutex_;
