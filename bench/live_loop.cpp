@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -52,11 +53,26 @@ double quantile(std::vector<double>& values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
-/// The same ticks twice, in turns of a few: as they are in the loop, and alone. What a turn of the first takes longer
-/// is the loop's, the safety stage's, the port's and the telemetry's.
+/// A stroke that was played before, through a port or without one.
+struct Played {
+  const ProbeSample* next;
+  SharedPort* port;
+  ProbeSample read() noexcept {
+    if (port != nullptr) static_cast<void>(port->read());
+    return *next++;
+  }
+  void apply(const Vec3& force, Seconds) noexcept {
+    if (port != nullptr) port->write(force);
+  }
+  [[nodiscard]] Vec3 aim() const noexcept { return next[-1].pose.position; }
+  [[nodiscard]] static bool finished() noexcept { return false; }
+};
+
+/// The same ticks in turns of a few: alone, in the loop, with a port, and with telemetry that a hub takes. What a turn
+/// takes longer than the one before is what that costs.
 Status measure_overhead(const Experiment& experiment) {
   constexpr std::size_t turn = 50;
-  constexpr std::size_t turns = 2000;
+  constexpr std::size_t rounds = 20;
   SceneLog scenes;
   const auto felt = scenes.begin(experiment.scene);
   ASPERITY_TRY(const auto board, SharedBoard::create());
@@ -69,47 +85,48 @@ Status measure_overhead(const Experiment& experiment) {
   SharedPort port(board);
   const Seconds dt(1.0 / experiment.rate);
   std::vector<ProbeSample> probes;
-  while (!path.finished() && probes.size() < turn * turns) {
+  while (!path.finished()) {
     probes.push_back(path.read());
     path.apply(Vec3::Zero(), dt);
   }
   LoopMeters meters;
-  Step in_loop;
-  Step alone;
-  std::vector<double> extra;
+  std::array<Step, 4> steps;
+  std::array<std::vector<double>, 3> extra;
   TelemetryReader<ProxyState>::Batch batch;
-  for (std::size_t begin = 0; begin + turn <= probes.size(); begin += turn) {
-    struct Played {
-      const ProbeSample* next;
-      SharedPort* port;
-      ProbeSample read() noexcept {
-        static_cast<void>(port->read());
-        return *next++;
+  for (std::size_t begin = 0, round = 0; round < rounds; begin += turn) {
+    if (begin + turn > probes.size()) {
+      begin = 0;
+      ++round;
+    }
+    std::array<double, 4> took{};
+    // Whoever is first finds nothing in the processor's caches: each in its turn.
+    for (std::size_t i = 0; i < took.size(); ++i) {
+      const std::size_t with = (i + begin / turn) % took.size();
+      Step& in_turn = steps[with];
+      OfflineClock clock(dt);
+      Played played{&probes[begin], with >= 2 ? &port : nullptr};
+      const auto render = [&](const ProbeSample& probe, Seconds length) noexcept {
+        return in_turn(*felt, probe, length);
+      };
+      const TickNotes notes;
+      const auto record = [&](const TraceRecord& tick) noexcept {
+        if (with == 3) feed(LiveTick<LiveScene, Step>{tick, notes, *felt, in_turn, safety});
+      };
+      const std::int64_t first = SteadyTime::now();
+      if (with == 0) {
+        for (std::size_t k = 0; k < turn; ++k) render(probes[begin + k], dt);
+      } else {
+        run_loop(clock, render, played, safety, LoopSettings{.max_ticks = turn}, record, {}, &meters);
       }
-      void apply(const Vec3& force, Seconds) noexcept { port->write(force); }
-      [[nodiscard]] Vec3 aim() const noexcept { return next[-1].pose.position; }
-      [[nodiscard]] static bool finished() noexcept { return false; }
-    } played{&probes[begin], &port};
-    OfflineClock clock(dt);
-    const TickNotes notes;
-    const auto step_in_loop = [&](const ProbeSample& probe, Seconds length) noexcept {
-      return in_loop(*felt, probe, length);
-    };
-    const auto record = [&](const TraceRecord& tick) noexcept {
-      feed(LiveTick<LiveScene, Step>{tick, notes, *felt, in_loop, safety});
-    };
-    const std::int64_t first = SteadyTime::now();
-    run_loop(clock, step_in_loop, played, safety, LoopSettings{.max_ticks = turn}, record, {}, &meters);
-    const std::int64_t second = SteadyTime::now();
-    ForceSample last;
-    for (std::size_t i = 0; i < turn; ++i) last = alone(*felt, probes[begin + i], dt);
-    const std::int64_t third = SteadyTime::now();
-    if (!last.wrench.force.allFinite()) return bad_value("is not finite", "force", {});
-    extra.push_back(static_cast<double>((second - first) - (third - second)) / static_cast<double>(turn));
+      took[with] = static_cast<double>(SteadyTime::now() - first) / static_cast<double>(turn);
+    }
+    for (std::size_t i = 0; i < extra.size(); ++i) extra[i].push_back(took[i + 1] - took[0]);
     reader->take(batch, std::chrono::milliseconds(0));
   }
-  fmt::print("loop, safety, port and telemetry on top of a step: {:.0f} ns (median of {} turns of {} ticks)\n",
-             quantile(extra, 0.5), extra.size(), turn);
+  fmt::print("on top of a step, a tick, medians of {} turns of {} ticks:\n", extra[0].size(), turn);
+  const char* const names[] = {"loop, meters and safety stage", "and the port", "and telemetry"};
+  for (std::size_t i = 0; i < extra.size(); ++i)
+    fmt::print("  {:<30} {:5.0f} ns   (p99 {:.0f} ns)\n", names[i], quantile(extra[i], 0.5), quantile(extra[i], 0.99));
   return success();
 }
 
