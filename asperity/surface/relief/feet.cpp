@@ -2,13 +2,14 @@
 // samples on a lattice over each face and led to their ends.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
+#include <optional>
 
-#include "asperity/surface/detail/four.h"
 #include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/relief/detail/bounds.h"
+#include "asperity/surface/relief/detail/kept_blocks.h"
 #include "asperity/surface/relief/detail/search.h"
 
 namespace asperity {
@@ -34,36 +35,27 @@ Goal goal_of_feet(const Vec3& p) noexcept {
 class ReliefFeetSearch {
  public:
   ReliefFeetSearch(const ReliefSurface& surface, const Vec3& p, const FeetAsked& asked, const CoatMoment& moment,
-                   ReliefBlocks* blocks, ContactSet& out) noexcept
-      : surface_(surface), p_(p), asked_(asked), reach_(asked.reach), moment_(moment), blocks_(blocks), out_(out) {}
+                   KeptBlocks* blocks, ContactSet& out) noexcept
+      : surface_(surface), p_(p), asked_(asked), reach_(asked.reach), moment_(moment), blocks_(blocks), out_(out) {
+    partners_ = blocks_ != nullptr ? &blocks_->partners() : &own_partners_.emplace();
+  }
 
   /// How far what is looked for may be (m): less once as many as that are known.
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
   [[nodiscard]] const WorkCount& count() const noexcept { return count_; }
 
+  /// Looks for places over a face.
   void visit(std::uint32_t face) noexcept {
-    ++count_.frames;
-    ReliefFrame& frame = blocks_ != nullptr ? blocks_->frame(face) : frame_;
-    if (blocks_ == nullptr || !surface_.holds(frame, face, moment_)) frame = surface_.frame(face, moment_);
-    const double samples = std::min(texels_across(frame) / leaf_of_texel, std::ldexp(1.0, deepest_part));
-    last_ = std::max(1 << (frame.stitched ? least_level_stitched : least_level), static_cast<int>(std::ceil(samples)));
-    step_ = 1.0 / last_;
-    narrowest_ = frame.stitched ? narrowest(frame.band) : 1.0;
-    const Vec3& edge_u = frame.prism.edge_u;
-    const Vec3& edge_v = frame.prism.edge_v;
-    least_drop_ =
-        2.0 * step_ * step_ * std::max({edge_u.squaredNorm(), edge_v.squaredNorm(), (edge_u - edge_v).squaredNorm()});
-    const Range range = within_reach(frame.prism);
-    const int width = std::max(range.to_u - range.from_u, range.to_v - range.from_v);
-    if (range.to_u <= range.from_u || range.to_v <= range.from_v) return;
-    std::uint32_t level = 0;
-    while (BlockSamples::across << level < width) ++level;
-    const int side = BlockSamples::across << level;
-    for (int i = range.from_u / side; i * side < range.to_u; ++i) {
-      for (int j = range.from_v / side; j * side < range.to_v; ++j)
-        search({face, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j), level}, frame, range);
-    }
+    for_each_block(face, [&](const ReliefFrame& frame, const Part& part) {
+      count_.evaluations += evaluations_of_block;
+      look_at(frame, part);
+    });
+  }
+
+  /// No more than how far the relief over a face is is within reach from then on.
+  void stay_off(std::uint32_t face) noexcept {
+    for_each_block(face, [&](const ReliefFrame&, const Part& part) { reach_ = std::min(reach_, part.away); });
   }
 
  private:
@@ -92,59 +84,91 @@ class ReliefFeetSearch {
             to(middle.y() + reach.y())};
   }
 
-  /// A part of the lattice and how far it is at least (m).
+  /// A part of the lattice, how far it is at least (m), and what it lies in.
   struct Part {
     ReliefBlockName name;
     double away = 0.0;
+    ReliefDisk disk;  ///< of all but the whole
   };
+  using Parts = FixedVector<Part, 3 * deepest_part + 4>;
 
-  /// A part of the lattice and those it is made of, as far as they may come within reach; the nearest first.
-  void search(const ReliefBlockName& whole, const ReliefFrame& frame, const Range& range) noexcept {
-    FixedVector<Part, 3 * deepest_part + 4> parts;
-    add(whole, frame, range, parts);
-    while (!parts.empty()) {
-      const Part part = parts[parts.size() - 1];
-      parts.swap_remove(parts.size() - 1);
-      if (part.away > reach_) continue;
-      const ReliefBlockName& name = part.name;
-      if (name.level == 0) {
-        look_at(frame, block_of(name, frame));
-        continue;
+  /// Calls see(frame, part) for the parts at level 0 of a face's lattice that may come within reach, the nearest first
+  /// of what lies side by side.
+  template <class See>
+  void for_each_block(std::uint32_t face, const See& see) noexcept {
+    ++count_.frames;
+    ReliefFrame& frame = blocks_ != nullptr ? blocks_->frame(face) : frame_;
+    if (blocks_ == nullptr || !surface_.holds(frame, face, moment_)) frame = surface_.frame(face, moment_);
+    const double samples = std::min(texels_across(frame) / leaf_of_texel, std::ldexp(1.0, deepest_part));
+    last_ = std::max(1 << (frame.stitched ? least_level_stitched : least_level), static_cast<int>(std::ceil(samples)));
+    step_ = 1.0 / last_;
+    narrowest_ = frame.stitched ? narrowest(frame.band) : 1.0;
+    const Vec3& edge_u = frame.prism.edge_u;
+    const Vec3& edge_v = frame.prism.edge_v;
+    least_drop_ =
+        2.0 * step_ * step_ * std::max({edge_u.squaredNorm(), edge_v.squaredNorm(), (edge_u - edge_v).squaredNorm()});
+    const Range range = within_reach(frame.prism);
+    const int width = std::max(range.to_u - range.from_u, range.to_v - range.from_v);
+    if (range.to_u <= range.from_u || range.to_v <= range.from_v) return;
+    from_corner_ = p_ - frame.prism.corner;
+    std::uint32_t level = 1;
+    while (BlockSamples::across << level < width) ++level;
+    const int side = BlockSamples::across << level;
+    Parts parts;
+    for (int i = range.from_u / side; i * side < range.to_u; ++i) {
+      for (int j = range.from_v / side; j * side < range.to_v; ++j) {
+        parts.push_back({{face, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j), level}, 0.0, {}});
+        while (!parts.empty()) {
+          const Part part = parts[parts.size() - 1];
+          parts.swap_remove(parts.size() - 1);
+          if (part.away > reach_) continue;
+          if (part.name.level == 0) {
+            see(frame, part);
+          } else {
+            add_quarters(part.name, frame, range, parts);
+          }
+        }
       }
-      const std::size_t first = parts.size();
-      for (int child = 0; child < 4; ++child) {
-        add({name.face, static_cast<std::uint16_t>(2 * name.i + (child & 1)),
-             static_cast<std::uint16_t>(2 * name.j + (child >> 1)), name.level - 1},
-            frame, range, parts);
-      }
-      std::sort(parts.begin() + static_cast<std::ptrdiff_t>(first), parts.end(),
-                [](const Part& a, const Part& b) { return a.away > b.away; });
     }
   }
 
-  /// A part to look at, if it may come within reach.
-  void add(const ReliefBlockName& name, const ReliefFrame& frame, const Range& range,
-           FixedVector<Part, 3 * deepest_part + 4>& parts) noexcept {
-    const int side = BlockSamples::across << name.level;
-    const int u = name.i * side;
-    const int v = name.j * side;
-    const bool beyond_third_side = u + v > last_;
-    if (beyond_third_side || u >= range.to_u || u + side <= range.from_u || v >= range.to_v || v + side <= range.from_v)
-      return;
-    count_.bounds += bounds_of_block;
-    const ReliefBlocks::Block& block = block_of(name, frame);
-    if (within_reach(block)) parts.push_back({name, block.disk.away(p_)});
+  /// The quarters of a part that may come within reach.
+  void add_quarters(const ReliefBlockName& name, const ReliefFrame& frame, const Range& range, Parts& parts) noexcept {
+    const ReliefQuarters& quarters = quarters_of(name, frame);
+    float away[ReliefQuarters::count];
+    least_distances(quarters, from_corner_, away);
+    const int side = BlockSamples::across << (name.level - 1);
+    const std::size_t first = parts.size();
+    for (int k = 0; k < ReliefQuarters::count; ++k) {
+      const int i = 2 * name.i + (k & 1);
+      const int j = 2 * name.j + (k >> 1);
+      const int u = i * side;
+      const int v = j * side;
+      const bool beyond_third_side = u + v > last_;
+      if (beyond_third_side || u >= range.to_u || u + side <= range.from_u || v >= range.to_v ||
+          v + side <= range.from_v)
+        continue;
+      count_.bounds += bounds_of_block;
+      if (static_cast<double>(away[k]) > reach_) continue;
+      const ReliefBlockName quarter{name.face, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j),
+                                    name.level - 1};
+      parts.push_back({quarter, static_cast<double>(away[k]), quarters.disk(k)});
+    }
+    std::sort(parts.begin() + static_cast<std::ptrdiff_t>(first), parts.end(),
+              [](const Part& a, const Part& b) { return a.away > b.away; });
   }
 
-  ReliefBlocks::Block& block_of(const ReliefBlockName& name, const ReliefFrame& frame) noexcept {
-    bool known = blocks_ == nullptr && block_.name == name;
-    ReliefBlocks::Block& block = blocks_ != nullptr ? blocks_->block(name, known) : block_;
-    if (known) return block;
-    block.name = name;
-    block.apart = 0.0F;
-    const int side = BlockSamples::across << name.level;
-    block.disk = disk_around(frame, name.i * side, name.j * side, side);
-    return block;
+  const ReliefQuarters& quarters_of(const ReliefBlockName& name, const ReliefFrame& frame) noexcept {
+    bool known = false;
+    ReliefQuarters& quarters = blocks_ != nullptr ? blocks_->quarters(name, known) : quarters_;
+    if (known) return quarters;
+    const int side = BlockSamples::across << (name.level - 1);
+    for (int k = 0; k < ReliefQuarters::count; ++k) {
+      const int u = (2 * name.i + (k & 1)) * side;
+      const int v = (2 * name.j + (k >> 1)) * side;
+      quarters.put(k, u + v > last_ ? ReliefDisk{} : disk_around(frame, u, v, side));
+    }
+    return quarters;
   }
 
   /// Around the relief over a part of the lattice and over what is right beside it.
@@ -166,20 +190,22 @@ class ReliefFeetSearch {
     const Vec2 beside_u(upper.x(), lower.y());
     const Vec2 beside_v(lower.x(), upper.y());
     const ReliefBound halves[2] = {half(lower, beside_u, beside_v), half(upper, beside_v, beside_u)};
-    const Vec3 middle = 0.5 * (halves[0].corner[0] + halves[1].corner[0]);
+    const Vec3& corner = frame.prism.corner;
+    const Vec3f rounded = (0.5 * (halves[0].corner[0] + halves[1].corner[0]) - corner).cast<float>();
+    const Vec3 middle = corner + rounded.cast<double>();
     const Vec3 normal =
         (halves[1].corner[0] - halves[0].corner[0]).cross(halves[0].corner[2] - halves[0].corner[1]).normalized();
     ReliefDisk disk;
     for (int a = 0; a < 3; ++a) {
-      disk.middle[a] = middle[a];
+      disk.middle[a] = rounded[a];
       disk.normal[a] = static_cast<float>(normal[a]);
     }
     double radius = 0.0;
     double thick = 0.0;
     for (const ReliefBound& bound : halves) {
-      for (const Vec3& corner : bound.corner) {
-        radius = std::max(radius, (corner - middle).norm() + bound.error);
-        thick = std::max(thick, std::abs(normal.dot(corner - middle)) + bound.error);
+      for (const Vec3& at : bound.corner) {
+        radius = std::max(radius, (at - middle).norm() + bound.error);
+        thick = std::max(thick, std::abs(normal.dot(at - middle)) + bound.error);
       }
     }
     // Rounded up, and for the normal's own rounding.
@@ -189,43 +215,33 @@ class ReliefFeetSearch {
   }
 
   /// Descends from every sample that is no farther than those around it and may lie beside a place within reach.
-  void look_at(const ReliefFrame& frame, ReliefBlocks::Block& block) noexcept {
+  void look_at(const ReliefFrame& frame, const Part& part) noexcept {
     bool known = false;
-    BlockSamples& samples = blocks_ != nullptr ? blocks_->samples(block, known) : samples_;
-    const Vec3 middle(block.disk.middle[0], block.disk.middle[1], block.disk.middle[2]);
-    const int from_u = block.name.i * BlockSamples::across;
-    const int from_v = block.name.j * BlockSamples::across;
+    BlockSamples& samples = blocks_ != nullptr ? blocks_->samples(part.name, known) : samples_;
+    const Vec3 middle(part.disk.middle[0], part.disk.middle[1], part.disk.middle[2]);
+    const int from_u = part.name.i * BlockSamples::across;
+    const int from_v = part.name.j * BlockSamples::across;
     if (!known) {
-      sample(frame, from_u, from_v, middle, samples);
-      tighten(samples, block);
+      sample(frame, from_u, from_v, frame.prism.corner + middle, samples);
+      enclose(part.disk, samples);
+      for (const bool along_u : {true, false}) samples.steep[along_u ? 0 : 1] = any_steep(frame, samples, along_u);
     }
-    const Eigen::Vector3f off = (p_ - middle).cast<float>();
-    float squares[BlockSamples::count];
+    if (!within_reach(samples)) return;
+    const Vec3f off = (from_corner_ - middle).cast<float>();
+    SampleSquares squares;
     squares_from(samples, off, squares);
-    // Of three samples side by side along v, the least.
-    Four of_row[stride][2];
-    for (int i = 0; i < stride; ++i) {
-      for (int half = 0; half < 2; ++half) {
-        const float* const row = &squares[i * stride + 4 * half];
-        of_row[i][half] = least(least(four_at(row), four_at(row + 1)), four_at(row + 2));
-      }
-    }
-    Four nearest = of_row[1][0];
     for (int i = 0; i < BlockSamples::across; ++i) {
-      for (int half = 0; half < 2; ++half) {
-        const float* const row = &squares[(i + 1) * stride + 4 * half + 1];
-        const Four around = least(least(of_row[i][half], of_row[i + 1][half]), of_row[i + 2][half]);
-        nearest = least(nearest, four_at(row));
-        const auto none_less = four_at(row) <= around;
-        for (int j = 0; any(none_less) && j < 4; ++j) {
-          if (none_less[j] != 0) start_from(frame, from_u + i, from_v + 4 * half + j, row + j);
-        }
+      for (std::uint32_t least = squares.least[i]; least != 0; least &= least - 1) {
+        const int j = std::countr_zero(least);
+        start_from(frame, from_u + i, from_v + j, &squares.of[(i + 1) * stride + j + 1]);
       }
     }
     const auto beside_touching = static_cast<float>(asked_.touching * asked_.touching + 2.0 * least_drop_);
-    if (any(nearest <= beside_touching)) look_closely(frame, from_u, from_v, squares, beside_touching);
+    if (squares.nearest <= beside_touching) look_closely(frame, from_u, from_v, squares, beside_touching);
     if (narrowest_ >= few_steps * step_) return;
-    for (const bool along_u : {true, false}) look_between(frame, from_u, from_v, along_u, samples, off);
+    for (const bool along_u : {true, false}) {
+      if (samples.steep[along_u ? 0 : 1]) look_between(frame, from_u, from_v, along_u, samples, off);
+    }
   }
 
   /// Of the bands in which a face's heights and those across its edges meet (barycentric); 1: it has none.
@@ -237,29 +253,45 @@ class ReliefFeetSearch {
     return least;
   }
 
+  /// Calls see(k, way, length) for the samples of a block that are far from the next one: `way` there, its length
+  /// squared.
+  template <class See>
+  void for_each_steep(const ReliefFrame& frame, const BlockSamples& samples, bool along_u,
+                      const See& see) const noexcept {
+    constexpr float more_than_level = 1.2F;  // of the squared distance
+    const int ahead = along_u ? stride : 1;
+    const Vec3& edge = along_u ? frame.prism.edge_u : frame.prism.edge_v;
+    const float far = more_than_level * static_cast<float>(step_ * step_ * edge.squaredNorm());
+    for (int k = 0; k < stride * stride - ahead; ++k) {
+      if (!along_u && k % stride == stride - 1) continue;
+      const Vec3f way = sample_at(samples, k + ahead) - sample_at(samples, k);
+      const float length = way.squaredNorm();
+      if (length > far && length < BlockSamples::far_off) see(k, way, length);
+    }
+  }
+
+  /// Whether there is any, in a face that has walls.
+  [[nodiscard]] bool any_steep(const ReliefFrame& frame, const BlockSamples& samples, bool along_u) const noexcept {
+    bool any = false;
+    if (narrowest_ < few_steps * step_)
+      for_each_steep(frame, samples, along_u, [&](int, const Vec3f&, float) { any = true; });
+    return any;
+  }
+
   /// Descends from between samples that are far apart: where the maps of two faces meet at unlike heights, a wall
   /// stands in a band that is narrower than the lattice's steps. Where the line from one sample to the other comes as
   /// near as those beside it, the surface is sampled along it, as finely as the band is narrow.
   void look_between(const ReliefFrame& frame, int from_u, int from_v, bool along_u, const BlockSamples& samples,
-                    const Eigen::Vector3f& p) noexcept {
-    constexpr float more_than_level = 1.2F;  // of the squared distance
+                    const Vec3f& p) noexcept {
     const int ahead = along_u ? stride : 1;
     const int beside = along_u ? 1 : stride;
     const Vec3& edge = along_u ? frame.prism.edge_u : frame.prism.edge_v;
-    const float far = more_than_level * static_cast<float>(step_ * step_ * edge.squaredNorm());
     float squares[BlockSamples::count];
     std::fill_n(squares, BlockSamples::count, BlockSamples::nowhere);
-    bool any_far = false;
-    for (int k = 0; k < stride * stride - ahead; ++k) {
-      if (!along_u && k % stride == stride - 1) continue;
-      const Eigen::Vector3f way = sample_at(samples, k + ahead) - sample_at(samples, k);
-      const float length = way.squaredNorm();
-      if (!(length > far && length < BlockSamples::far_off)) continue;
-      const Eigen::Vector3f to = p - sample_at(samples, k);
+    for_each_steep(frame, samples, along_u, [&](int k, const Vec3f& way, float length) {
+      const Vec3f to = p - sample_at(samples, k);
       squares[k] = (to - std::clamp(to.dot(way) / length, 0.0F, 1.0F) * way).squaredNorm();
-      any_far = true;
-    }
-    if (!any_far) return;
+    });
     for (int i = 0; i < BlockSamples::across; ++i) {
       for (int j = 0; j < BlockSamples::across; ++j) {
         const int k = (i + 1) * stride + j + 1;
@@ -298,7 +330,7 @@ class ReliefFeetSearch {
         u[k] = place.x();
         v[k] = std::min(place.y(), 1.0 - u[k]);
       }
-      surface_.heights_alone(frame, u, v, heights);
+      surface_.heights_alone(frame, u, v, *partners_, heights);
       for (std::size_t k = 0; k < lanes; ++k)
         look(first + static_cast<int>(k) - 1, (frame.prism.point({u[k], v[k], heights[k]}) - p_).norm());
     }
@@ -306,7 +338,7 @@ class ReliefFeetSearch {
     count_.evaluations += static_cast<std::uint32_t>(parts) / static_cast<std::uint32_t>(lanes);
   }
 
-  static Eigen::Vector3f sample_at(const BlockSamples& samples, int k) noexcept {
+  static Vec3f sample_at(const BlockSamples& samples, int k) noexcept {
     return {samples.x[k], samples.y[k], samples.z[k]};
   }
 
@@ -319,23 +351,32 @@ class ReliefFeetSearch {
 
   /// Of a ball that touches a narrow crest, samples next to each other are more or less off it: which of them is the
   /// least tells nothing of where along the crest it is. So crests are led to first, by parabolas across.
-  void look_closely(const ReliefFrame& frame, int from_u, int from_v, const float (&squares)[BlockSamples::count],
+  void look_closely(const ReliefFrame& frame, int from_u, int from_v, const SampleSquares& squares,
                     float beside_touching) noexcept {
+    const double nearer = std::min(asked_.touching, reach_);
+    const auto touching = static_cast<float>(nearer * nearer);
+    std::uint32_t rows[BlockSamples::across];
+    if (!beside_crests(squares, touching, rows)) return;
     float crests[BlockSamples::count];
-    std::fill_n(crests, BlockSamples::count, BlockSamples::nowhere);
-    const auto each = [](const auto& look) {
+    std::copy_n(squares.of, BlockSamples::count, crests);
+    const auto each = [&](const auto& look) {
       for (int i = 0; i < BlockSamples::across; ++i) {
-        for (int j = 0; j < BlockSamples::across; ++j) look(i, j, (i + 1) * stride + j + 1);
+        for (std::uint32_t row = rows[i]; row != 0; row &= row - 1) {
+          const int j = std::countr_zero(row);
+          look(i, j, (i + 1) * stride + j + 1);
+        }
       }
     };
     each([&](int, int, int k) {
-      crests[k] = squares[k] <= beside_touching ? crest_beside(&squares[k]).square : squares[k];
+      if (squares.of[k] <= beside_touching) crests[k] = crest_beside(&squares.of[k]).square;
     });
-    const double nearer = std::min(asked_.touching, reach_);
-    const auto touching = static_cast<float>(nearer * nearer);
+    // What is beside the block is not looked for here.
+    for (int k = 0; k < stride; ++k)
+      crests[k] = crests[k * stride] = crests[k * stride + stride - 1] = crests[(stride - 1) * stride + k] =
+          BlockSamples::nowhere;
     each([&](int i, int j, int k) {
       if (crests[k] > touching || !first_of_like(&crests[k])) return;
-      const Beside crest = crest_beside(&squares[k]);
+      const Beside crest = crest_beside(&squares.of[k]);
       const double u = std::clamp((from_u + i + static_cast<double>(crest.u)) * step_, 0.0, 1.0);
       const double v = std::clamp((from_v + j + static_cast<double>(crest.v)) * step_, 0.0, 1.0 - u);
       const bool known = std::any_of(out_.begin(), out_.end(), [&](const Foot& foot) {
@@ -382,69 +423,11 @@ class ReliefFeetSearch {
     descend_from({frame, u, v});
   }
 
-  using Four = four::Floats;
-  static Four four_at(const float* first) noexcept {
-    Four four;
-    std::memcpy(&four, first, sizeof(four));
-    return four;
-  }
-  static Four least(const Four& a, const Four& b) noexcept { return a < b ? a : b; }
-  template <class Mask>
-  static bool any(const Mask& mask) noexcept {
-    std::uint64_t words[2];
-    std::memcpy(words, &mask, sizeof(words));
-    return (words[0] | words[1]) != 0;
-  }
-
-  static void squares_from(const BlockSamples& samples, const Eigen::Vector3f& p,
-                           float (&squares)[BlockSamples::count]) noexcept {
-    for (int k = 0; k < BlockSamples::count; ++k) {
-      const float x = samples.x[k] - p.x();
-      const float y = samples.y[k] - p.y();
-      const float z = samples.z[k] - p.z();
-      squares[k] = x * x + y * y + z * z;
-    }
-  }
-
-  /// A disk as narrow as what is looked for among a block's samples lets it be: one of them that lies beside a place
-  /// within reach is itself no farther than reach and, about, their distance from one another.
-  static void tighten(const BlockSamples& samples, ReliefBlocks::Block& block) noexcept {
-    const Eigen::Vector3f normal(block.disk.normal[0], block.disk.normal[1], block.disk.normal[2]);
-    float lowest = BlockSamples::nowhere;
-    float highest = -BlockSamples::nowhere;
-    float radius = 0.0F;
-    float apart = 0.0F;
-    const auto at = [&](int k) { return sample_at(samples, k); };
-    for (int k = 0; k < stride * stride; ++k) {
-      if (!(samples.x[k] < BlockSamples::far_off)) continue;
-      const Eigen::Vector3f here = at(k);
-      const float above = normal.dot(here);
-      lowest = std::min(lowest, above);
-      highest = std::max(highest, above);
-      radius = std::max(radius, here.squaredNorm());
-      for (const int to : {k + 1, k + stride}) {
-        if (to % stride == 0 || to >= stride * stride || !(samples.x[to] < BlockSamples::far_off)) continue;
-        apart = std::max(apart, (at(to) - here).squaredNorm());
-      }
-    }
-    constexpr float rounding = 1e-5F;
-    radius = std::sqrt(radius);
-    block.around_samples = block.disk;
-    for (int a = 0; a < 3; ++a)
-      block.around_samples.middle[a] += 0.5 * static_cast<double>(lowest + highest) * static_cast<double>(normal[a]);
-    block.around_samples.half = 0.5F * (highest - lowest) + rounding * radius;
-    block.around_samples.radius = (1.0F + rounding) * radius;
-    block.apart = (1.0F + rounding) * std::sqrt(apart);
-  }
-
-  /// Whether something of a part may be what is looked for.
-  [[nodiscard]] bool within_reach(const ReliefBlocks::Block& block) noexcept {
-    if (!block.disk.may_be_within(reach_, p_)) return false;
-    if (block.name.level == 0) count_.evaluations += evaluations_of_block;
-    if (block.apart <= 0.0F) return true;
-    const auto apart = static_cast<double>(block.apart);
+  /// Whether something of a block may be what is looked for.
+  [[nodiscard]] bool within_reach(const BlockSamples& samples) const noexcept {
+    const auto apart = static_cast<double>(samples.apart);
     const double reach = reach_ + apart + std::max(apart * apart, least_drop_) / reach_;
-    return block.around_samples.may_be_within(reach, p_);
+    return samples.around.may_be_within(reach, from_corner_);
   }
 
   /// Of two as near, the first.
@@ -463,7 +446,7 @@ class ReliefFeetSearch {
   }
 
   /// The surface at a block's samples and at those around it.
-  void sample(const ReliefFrame& frame, int from_u, int from_v, const Vec3& middle, BlockSamples& out) const noexcept {
+  void sample(const ReliefFrame& frame, int from_u, int from_v, const Vec3& middle, BlockSamples& out) noexcept {
     std::fill_n(out.x, BlockSamples::count, BlockSamples::far_off);
     std::fill_n(out.y, BlockSamples::count, 0.0F);
     std::fill_n(out.z, BlockSamples::count, 0.0F);
@@ -480,15 +463,9 @@ class ReliefFeetSearch {
           u[k] = i * step_;
           v[k] = std::min(j + static_cast<int>(k), end - 1) * step_;
         }
-        surface_.heights_alone(frame, u, v, heights);
-        for (int k = 0; k < static_cast<int>(lanes) && j + k < end; ++k) {
-          const auto lane = static_cast<std::size_t>(k);
-          const Vec3 there = frame.prism.point({u[lane], v[lane], heights[lane]}) - middle;
-          const int at = (i - from_u + 1) * stride + j + k - from_v + 1;
-          out.x[at] = static_cast<float>(there.x());
-          out.y[at] = static_cast<float>(there.y());
-          out.z[at] = static_cast<float>(there.z());
-        }
+        surface_.heights_alone(frame, u, v, *partners_, heights);
+        put_samples(frame.prism, u, v, heights, middle, std::min(static_cast<int>(lanes), end - j),
+                    (i - from_u + 1) * stride + j - from_v + 1, out);
       }
     }
   }
@@ -514,6 +491,11 @@ class ReliefFeetSearch {
     }
     const Foot foot = foot_at(at, spot, p_);
     if (foot.distance > reach_) return;
+    if (blocks_ != nullptr) {
+      bool known = false;
+      ReliefPoint& kept = blocks_->spot(foot.element, at.u, at.v, known);
+      if (!known) kept = spot;
+    }
     const double same = 1e-2 * surface_.grain();
     for (const Foot& other : out_) {
       if ((other.point - foot.point).norm() <= same) return;
@@ -546,14 +528,17 @@ class ReliefFeetSearch {
   FeetAsked asked_;
   double reach_;
   CoatMoment moment_;
-  ReliefBlocks* blocks_;  ///< none: every look is the first
+  KeptBlocks* blocks_;  ///< none: every look is the first
   ContactSet& out_;
   ReliefFrame frame_;
-  ReliefBlocks::Block block_;
+  ReliefQuarters quarters_;
   BlockSamples samples_;
-  double step_ = 1.0;       ///< of the face's lattice (barycentric)
-  int last_ = 1;            ///< sample along an edge
-  double narrowest_ = 1.0;  ///< of the face's bands (barycentric)
+  std::optional<ReliefPartners> own_partners_;
+  ReliefPartners* partners_;
+  Vec3 from_corner_ = Vec3::Zero();  ///< of the face to where places are looked for (m)
+  double step_ = 1.0;                ///< of the face's lattice (barycentric)
+  int last_ = 1;                     ///< sample along an edge
+  double narrowest_ = 1.0;           ///< of the face's bands (barycentric)
   /// By how much (m^2) a sample may be farther than a place beside it that is nearest, at least: at the face's border
   /// what lies on one side of it is not known.
   double least_drop_ = 0.0;
@@ -562,31 +547,61 @@ class ReliefFeetSearch {
 
 }  // namespace
 
+const ReliefFrame& ReliefView::kept_frame(std::uint32_t face) const noexcept {
+  ReliefFrame& frame = cache_->blocks->of(surface_->identity(), moment_).frame(face);
+  if (!surface_->holds(frame, face, moment_)) frame = surface_->frame(face, moment_);
+  return frame;
+}
+
+ReliefPoint& ReliefView::kept_spot(std::uint32_t face, double u, double v) const noexcept {
+  bool known = false;
+  ReliefPoint& spot = cache_->blocks->of(surface_->identity(), moment_).spot(face, u, v, known);
+  if (!known) spot = surface_->point(kept_frame(face), u, v);
+  return spot;
+}
+
+void ReliefView::keep(const ReliefPlace& place, const ReliefPoint& spot) const noexcept {
+  bool known = false;
+  ReliefPoint& kept = cache_->blocks->of(surface_->identity(), moment_).spot(place.frame.face, place.u, place.v, known);
+  if (!known) kept = spot;
+}
+
 Foot ReliefView::follow(const Vec3& p, const Foot& foot) const noexcept {
   ReliefPlace place;
-  if (ReliefBlocks* const blocks = cache_->blocks) {
-    blocks->keep_only(surface_->identity(), moment_);
-    ReliefFrame& frame = blocks->frame(foot.element);
-    if (!surface_->holds(frame, foot.element, moment_)) frame = surface_->frame(foot.element, moment_);
-    place = {frame, foot.at[1], foot.at[2]};
+  ReliefPoint spot;
+  if (cache_->blocks != nullptr) {
+    place = {kept_frame(foot.element), foot.at[1], foot.at[2]};
+    spot = kept_spot(foot.element, place.u, place.v);
   } else {
     place = {surface_->frame(foot.element, moment_), foot.at[1], foot.at[2]};
+    spot = surface_->point(place.frame, place.u, place.v);
   }
-  ReliefPoint spot = surface_->point(place.frame, place.u, place.v);
   WorkCount count;
   ++count.frames;
   asperity::descend(*surface_, place, spot, 1.0, goal_of_feet(p), count);
   tell(cache_->work, count);
+  if (cache_->blocks != nullptr) keep(place, spot);
   return foot_at(place, spot, p);
+}
+
+double ReliefView::room_around(const Vec3& p, double within) const noexcept {
+  KeptBlocks* const blocks = cache_->blocks != nullptr ? &cache_->blocks->of(surface_->identity(), moment_) : nullptr;
+  ContactSet none;
+  ReliefFeetSearch search(*surface_, p, {within, within}, moment_, blocks, none);
+  surface_->base().index().for_each_near(p, within, surface_->boxes(), [&](std::uint32_t face) {
+    search.stay_off(face);
+    return search.reach();
+  });
+  tell(cache_->work, search.count());
+  return search.reach();
 }
 
 void ReliefView::feet(const Vec3& p, const FeetAsked& asked, ContactSet& out) const noexcept {
   out.clear();
-  ReliefBlocks* const blocks = cache_->blocks;
+  KeptBlocks* const blocks = cache_->blocks != nullptr ? &cache_->blocks->of(surface_->identity(), moment_) : nullptr;
   if (blocks != nullptr) {
-    blocks->keep_only(surface_->identity(), moment_);
     // A tick begins where the last one has ended.
-    if (const ReliefBlocks::Answer* known = blocks->answer(p, asked)) {
+    if (const KeptBlocks::Answer* known = blocks->answer(p, asked)) {
       out = known->feet;
       tell(cache_->work, known->count);
       return;

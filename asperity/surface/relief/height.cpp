@@ -19,10 +19,34 @@ bool ReliefSurface::within_bands(const StitchBand& band, double u, double v) noe
   return false;
 }
 
+template <class PartnerOf>
+double ReliefSurface::stitched_height(const ReliefFrame& frame, double u, double v,
+                                      const PartnerOf& partner_of) const noexcept {
+  const Stitching& stitching = coat_.settings().stitching;
+  double weights = weight_alone(stitching, frame.band, u, v);
+  double sum = weights * coat_.height(frame.coat, u, v);
+  const double seam = frame.partly ? frame.seam + u * frame.seam_u + v * frame.seam_v : 1.0;
+  for_each_partner(frame, u, v, [&](std::uint32_t other) {
+    const ReliefPartner& partner = partner_of(other);
+    const ProjectedPlace place = project_place(frame.prism, u, v, partner.prism);
+    if (!place.seen || !has_say(bands_[other], place.u, place.v)) return;
+    const double weight = seam * weight_alone(stitching, bands_[other], place.u, place.v);
+    if (weight <= 0.0) return;
+    weights += weight;
+    sum += weight * coat_.height(partner.coat, place.u, place.v);
+  });
+  const double whole = sum / weights;
+  return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
+}
+
 double ReliefSurface::height_alone(const ReliefFrame& frame, double u, double v) const noexcept {
   if (in_band(frame, u, v)) {
-    return coat_.settings().stitching.folds == FoldMode::keep ? stitched_height(frame, u, v)
-                                                              : rounded(frame, u, v).height;
+    if (coat_.settings().stitching.folds != FoldMode::keep) return rounded(frame, u, v).height;
+    ReliefPartner partner;
+    return stitched_height(frame, u, v, [&](std::uint32_t face) -> const ReliefPartner& {
+      partner = {face, shell_.prism(base_.mesh(), face), coat_.frame(rest_.mesh(), face, frame.coat.moment)};
+      return partner;
+    });
   }
   const double whole = coat_.height(frame.coat, u, v);
   return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
@@ -34,6 +58,24 @@ void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, cons
   for (std::size_t i = 0; i < lanes; ++i) {
     if (in_band(frame, u[i], v[i])) {
       heights[i] = height_alone(frame, u[i], v[i]);
+    } else if (frame.lowered) {
+      heights[i] *= frame.share + u[i] * frame.share_u + v[i] * frame.share_v;
+    }
+  }
+}
+
+void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v, ReliefPartners& partners,
+                                  Lanes& heights) const noexcept {
+  if (coat_.settings().stitching.folds != FoldMode::keep) return heights_alone(frame, u, v, heights);
+  coat_.heights(frame.coat, u, v, heights);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    if (in_band(frame, u[i], v[i])) {
+      heights[i] = stitched_height(frame, u[i], v[i], [&](std::uint32_t face) -> const ReliefPartner& {
+        ReliefPartner& partner = partners.of(face);
+        if (partner.face != face)
+          partner = {face, shell_.prism(base_.mesh(), face), coat_.frame(rest_.mesh(), face, frame.coat.moment)};
+        return partner;
+      });
     } else if (frame.lowered) {
       heights[i] *= frame.share + u[i] * frame.share_u + v[i] * frame.share_v;
     }
@@ -113,24 +155,6 @@ HeightJet ReliefSurface::stitched(const ReliefFrame& frame, double u, double v) 
   HeightJet blended = quotient(sum, weights, 1.0 / weights.height);
   lower_by_share(frame, u, v, blended);
   return blended;
-}
-
-double ReliefSurface::stitched_height(const ReliefFrame& frame, double u, double v) const noexcept {
-  const Stitching& stitching = coat_.settings().stitching;
-  const TriangleMesh& mesh = base_.mesh();
-  double weights = weight_alone(stitching, frame.band, u, v);
-  double sum = weights * coat_.height(frame.coat, u, v);
-  const double seam = frame.partly ? frame.seam + u * frame.seam_u + v * frame.seam_v : 1.0;
-  for_each_partner(frame, u, v, [&](std::uint32_t other) {
-    const ProjectedPlace place = project_place(frame.prism, u, v, shell_.prism(mesh, other));
-    if (!place.seen || !has_say(bands_[other], place.u, place.v)) return;
-    const double weight = seam * weight_alone(stitching, bands_[other], place.u, place.v);
-    if (weight <= 0.0) return;
-    weights += weight;
-    sum += weight * coat_.height(coat_.frame(rest_.mesh(), other, frame.coat.moment), place.u, place.v);
-  });
-  const double whole = sum / weights;
-  return frame.lowered ? whole * (frame.share + u * frame.share_u + v * frame.share_v) : whole;
 }
 
 namespace {

@@ -192,6 +192,7 @@ Foot ReliefView::nearest(const Vec3& p, double bound, const Place& start) const 
   tell(cache_->work, search.count());
   if (!search.found()) return {};
   cache_->relief = {search.place(), search.spot(), true};
+  if (cache_->blocks != nullptr) keep(search.place(), search.spot());
   return foot_at(search.place(), search.spot(), p);
 }
 

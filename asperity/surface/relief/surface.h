@@ -15,6 +15,7 @@
 namespace asperity {
 
 class ReliefView;
+class ReliefPartners;
 
 /// What to do with a coat whose relief folds over itself: whose heights are more than some prism of the shell holds.
 enum class OnOverlap {
@@ -103,6 +104,9 @@ class ReliefSurface {
   [[nodiscard]] double height_alone(const ReliefFrame& frame, double u, double v) const noexcept;
   /// The same at several places at once, equal to the bit. [servo]
   void heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v, Lanes& heights) const noexcept;
+  /// And where other faces have a say, what is known of those is kept for the next places. [servo]
+  void heights_alone(const ReliefFrame& frame, const Lanes& u, const Lanes& v, ReliefPartners& partners,
+                     Lanes& heights) const noexcept;
   /// Heights that are asked for there, about: the face's own, and in a band those of the faces around. [servo]
   [[nodiscard]] std::uint32_t heights_at(const ReliefFrame& frame, double u, double v) const noexcept {
     return in_band(frame, u, v) ? heights_in_band : 1;
@@ -218,7 +222,9 @@ class ReliefSurface {
   [[nodiscard]] HeightRange enclose_face(std::uint32_t face, Box& box) const noexcept;
   void find_overlaps(const Enclosed& enclosed);
   [[nodiscard]] HeightJet stitched(const ReliefFrame& frame, double u, double v) const noexcept;
-  [[nodiscard]] double stitched_height(const ReliefFrame& frame, double u, double v) const noexcept;
+  template <class PartnerOf>
+  [[nodiscard]] double stitched_height(const ReliefFrame& frame, double u, double v,
+                                       const PartnerOf& partner_of) const noexcept;
   [[nodiscard]] HeightJet rounded(const ReliefFrame& frame, double u, double v) const noexcept;
   /// How far across its band a place is towards where another face has lost its say, which is at 1.
   [[nodiscard]] double share_across(const ReliefFrame& frame, const ShellPlace& place, const ShellGradients& gradients,

@@ -141,6 +141,7 @@ DescentEnd ReliefView::descend(Place& place, ReliefPoint& spot, const Goal& goal
   tell(cache_->work, count);
   cache.spot = spot;
   cache.evaluated = true;
+  if (cache_->blocks != nullptr) keep(cache.place, spot);
   place.element = cache.place.frame.face;
   place.at = {1.0 - cache.place.u - cache.place.v, cache.place.u, cache.place.v};
   return end;

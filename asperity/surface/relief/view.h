@@ -47,9 +47,12 @@ class ReliefView {
   /// Every place of the surface within reach of p that is nearer to it than those around, as far as asked for; the
   /// nearest first. Normals as nearest's.
   void feet(const Vec3& p, const FeetAsked& asked, ContactSet& out) const noexcept;
+  /// How far p is at least from the surface (m), `within` where that is farther: a bound that is looked up.
+  [[nodiscard]] double room_around(const Vec3& p, double within) const noexcept;
   /// Where a place that feet has told is led to by a ball whose centre is now at p. It may come to that of another one.
   [[nodiscard]] Foot follow(const Vec3& p, const Foot& foot) const noexcept;
   [[nodiscard]] const ReliefPoint& at(const Place& place, const Vec3& = Vec3::Zero()) const noexcept {
+    if (cache_->blocks != nullptr) return kept_spot(place.element, place.at[1], place.at[2]);
     ReliefCache& cache = hold(place.element);
     const double u = place.at[1];
     const double v = place.at[2];
@@ -90,7 +93,9 @@ class ReliefView {
   [[nodiscard]] const ReliefSurface& surface() const noexcept { return *surface_; }
   [[nodiscard]] const CoatMoment& moment() const noexcept { return moment_; }
   /// The triangle of a place.
-  [[nodiscard]] const ReliefFrame& frame(std::uint32_t face) const noexcept { return hold(face).place.frame; }
+  [[nodiscard]] const ReliefFrame& frame(std::uint32_t face) const noexcept {
+    return cache_->blocks != nullptr ? kept_frame(face) : hold(face).place.frame;
+  }
 
  private:
   [[nodiscard]] ReliefCache& hold(std::uint32_t face) const noexcept {
@@ -101,6 +106,11 @@ class ReliefView {
     }
     return cache;
   }
+  /// What is kept for balls, who touch several places at once: see ReliefBlocks.
+  [[nodiscard]] const ReliefFrame& kept_frame(std::uint32_t face) const noexcept;
+  [[nodiscard]] ReliefPoint& kept_spot(std::uint32_t face, double u, double v) const noexcept;
+  /// The surface at a place, which is asked for next.
+  void keep(const ReliefPlace& place, const ReliefPoint& spot) const noexcept;
   [[nodiscard]] static Place place_of(const Foot& foot) noexcept { return {foot.element, false, foot.at}; }
   /// Unit direction that leads off a place, on its side, and away from all faces around it.
   [[nodiscard]] Vec3 way_off(const Place& place, const ReliefPoint& spot) const noexcept;
