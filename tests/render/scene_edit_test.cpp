@@ -159,7 +159,7 @@ TEST(SceneEdit, TakesLessThan50Microseconds) {
         ASSERT_TRUE(next.ok()) << next.error().message();
       }
       // Tools that watch every access are some ten times slower.
-#if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(NDEBUG) && !defined(ASPERITY_SANITIZED)
       EXPECT_LT(quickest, 50e-6) << to_string(edit.kind);
 #else
       EXPECT_LT(quickest, 5e-3) << to_string(edit.kind);
