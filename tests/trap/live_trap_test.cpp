@@ -94,7 +94,7 @@ TEST(LiveTrap, TheServoThreadNeitherAllocatesLocksThrowsTouchesFilesNorFreesScen
   const bool counts_count = true;
 #endif
   const char* const asked = std::getenv("ASPERITY_LIVE_SECONDS");
-  const double seconds = asked != nullptr ? std::atof(asked) : 4.0;
+  const double seconds = asked != nullptr ? std::atof(asked) : 20.0;
   std::thread::id servo;
   std::atomic<int> freed_there = 0;
   std::atomic<std::uint64_t> unchecked = 0;
