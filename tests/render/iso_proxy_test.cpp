@@ -547,8 +547,7 @@ TEST_P(IsoProxyEach, ABallComesToRestAmongAllThatItTouches) {
     }
   }
   ASSERT_GT(held_by_several, 200);
-  // The surface of a trilinear field is creased from cell to cell.
-  ASSERT_LE(unfinished_ticks, GetParam() == CellReconstruction::trilinear ? 10 : 0);
+  ASSERT_EQ(unfinished_ticks, 0);
 }
 
 TEST(IsoProxy, NothingIsFeltBeyondTheBorderOrInHoles) {

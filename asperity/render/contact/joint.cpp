@@ -461,10 +461,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
   }
   solution.projection = project_onto_planes(goal, solution.planes, false);
   // Planes that would have it elsewhere are not all that holds it.
-  constexpr double most_gaps = 100.0;
-  if (smooth_ &&
-      (solution.projection.point - solution.proxy).norm() > most_gaps * (margin() + widest_skin_) + tolerance_)
-    solution.converged = false;
+  if (smooth_ && !explains((solution.projection.point - solution.proxy).norm())) solution.converged = false;
   if (!solution.settled()) share_out(goal, solution);
   return solution;
 }

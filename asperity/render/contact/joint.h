@@ -137,6 +137,7 @@ class JointSolve {
 
   /// Whether all that a ball may rest on there is known: told at once, or followed from one look to the next.
   [[nodiscard]] bool knows_feet(const Entry& entry) const noexcept;
+  [[nodiscard]] bool tells_nearest_alone(const Entry& entry) const noexcept;
   [[nodiscard]] bool foot_plane(std::size_t index, const Vec3& position, ConstraintPlane& plane) noexcept;
   [[nodiscard]] bool plane_off(std::size_t index, const Vec3& local, const Foot& foot, Place& place,
                                ConstraintPlane& plane) const noexcept;
@@ -161,6 +162,12 @@ class JointSolve {
   [[nodiscard]] Mat3 bend_of(const ConstraintPlane& plane, const Vec3& position) const noexcept;
   [[nodiscard]] Vec3 bent_step(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy, const Vec3& goal,
                                double stiffest, double& gain) const noexcept;
+  /// Whether planes hold the ball that would have it so far (m) from where it is. [servo]
+  [[nodiscard]] bool explains(double off) const noexcept {
+    constexpr double most_gaps = 100.0;
+    return off <= most_gaps * (margin() + widest_skin_) + tolerance_;
+  }
+  void recall(const Vec3& position, PlaneSet& planes) noexcept;
   [[nodiscard]] double free_around(const Vec3& position, double far) noexcept;
   [[nodiscard]] double swept_share(const Segment& motion, CutSet& met) noexcept;
   [[nodiscard]] static double overlap(const PlaneSet& planes, const Vec3& position) noexcept;
@@ -168,7 +175,7 @@ class JointSolve {
   void with_cuts(const CutSet& cuts, const Vec3& position, PlaneSet& planes) const noexcept;
   [[nodiscard]] bool plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move) noexcept;
   [[nodiscard]] bool make(BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept;
-  static void learn(const CutSet& met, BallMove& move) noexcept;
+  void learn(const CutSet& met, BallMove& move) noexcept;
   [[nodiscard]] bool leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexcept;
   void settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void share_out(const Vec3& goal, ConstraintSolution& solution) noexcept;

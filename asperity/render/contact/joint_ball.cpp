@@ -56,10 +56,24 @@ Mat3 bend_at_distance(const Mat3& bend, double distance) noexcept {
   return principal.scaling_by(curvature.array() / (1.0 + distance * curvature.array()).max(least));
 }
 
+/// A foot as exactly as the surface can tell it.
+template <SurfaceView View>
+Foot refined(const View& view, const Foot& foot, const Vec3& local) noexcept {
+  if constexpr (requires { view.refined(foot, local); }) {
+    if (foot.found()) return view.refined(foot, local);
+  }
+  return foot;
+}
+
 }  // namespace
 
 bool JointSolve::knows_feet(const Entry& entry) const noexcept {
   return radius_ > 0.0 && entry.smooth && (!facets_ || std::holds_alternative<ReliefView>(entry.touch->view));
+}
+
+/// Of those, whether a look tells the nearest place alone.
+bool JointSolve::tells_nearest_alone(const Entry& entry) const noexcept {
+  return knows_feet(entry) && !std::holds_alternative<ReliefView>(entry.touch->view);
 }
 
 /// The second derivative of the distance from what a plane is of, where the ball's centre is.
@@ -140,8 +154,9 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
                  {.touching = touching, .reach = touching + beyond, .most = most_feet, .of_overlap = deepest_share},
                  feet);
   } else {
-    const Foot foot = on_smooth_view(
-        entry.touch->view, [&](const auto& view) { return view.nearest(local, touching + beyond, entry.near); });
+    const Foot foot = on_smooth_view(entry.touch->view, [&](const auto& view) {
+      return refined(view, view.nearest(local, touching + beyond, entry.near), local);
+    });
     if (foot.found()) feet.push_back(foot);
   }
   keep_following(index, position, relief != nullptr ? touching + beyond : 0.0, feet);
@@ -166,7 +181,7 @@ Foot JointSolve::led_to(const Entry& entry, const Vec3& local, const Foot& foot)
     Foot led{spot.point, Vec3::Zero(), (local - spot.point).norm(), place.element, place.at};
     if constexpr (requires { view.element_at(spot.point); }) led.element = view.element_at(spot.point);
     led.normal = side * view.front(led);
-    return led;
+    return refined(view, led, local);
   });
 }
 
@@ -237,6 +252,22 @@ void JointSolve::followed_planes(std::size_t index, const Vec3& position, PlaneS
     Place place;
     ConstraintPlane plane;
     if (!met && plane_off(index, local, one.foot, place, plane)) out.push_back(plane);
+  }
+}
+
+/// Adds what has been found since `planes` were looked for at `position`, of surfaces of which a look tells the nearest
+/// place alone: pressed against several at once, a ball knew one there, and tried in vain to leave the others.
+void JointSolve::recall(const Vec3& position, PlaneSet& planes) noexcept {
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (!tells_nearest_alone(entries_[i])) continue;
+    PlaneSet known;
+    followed_planes(i, position, known);
+    for (const ConstraintPlane& plane : known) {
+      const bool there = std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& other) {
+        return other.owner == i && same_place(i, plane.contact, other.contact);
+      });
+      if (!there) planes.push_back(plane);
+    }
   }
 }
 
@@ -361,11 +392,12 @@ bool JointSolve::plan(const Vec3& proxy, const PlaneSet& planes, BallMove& move)
   return true;
 }
 
-/// What a move that came to nothing has met is kept to from then on.
+/// What a move that came to nothing has met is kept to from then on; followed as well, where no look may tell it.
 void JointSolve::learn(const CutSet& met, BallMove& move) noexcept {
   for (const ConstraintPlane& plane : met) {
     if (move.cuts.size() == move.cuts.capacity()) move.cuts.swap_remove(0);
     move.cuts.push_back(plane);
+    if (tells_nearest_alone(entries_[plane.owner])) follow({plane.owner, plane.contact, Vec3::Constant(infinity)});
   }
 }
 
@@ -439,7 +471,8 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
 
 void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noexcept {
   constexpr int most_moves = 160;
-  // Where all that pulls is held, but for next to nothing, moves that come no nearer by as much are none.
+  // Where all that pulls is held, but for next to nothing, moves that come no nearer by as much are none; unless what
+  // is known would have the ball elsewhere.
   constexpr int look_after = 12;
   constexpr double least_gain = 1e-5;
   double looked_at = infinity;
@@ -448,22 +481,26 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
   int vain_leaps = 0;
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
+  bool stayed = false;
   for (int i = 0; i < most_moves && !work_.spent(); ++i) {
+    if (stayed) recall(solution.proxy, solution.planes);
     const bool there = !plan(solution.proxy, solution.planes, move);
     bool on = !there;
     // Where nothing is known to hold it, it goes on.
     if (on && !solution.planes.empty() && i % look_after == look_after - 1) {
       const double distance = (solution.proxy - goal).norm();
-      on = distance < looked_at * (1.0 - least_gain);
+      on = distance < looked_at * (1.0 - least_gain) || !explains(move.rest);
       looked_at = distance;
       if (!on) move.room = 0.0;
     }
     if (on && vain_leaps < most_vain_leaps && !solution.planes.empty()) {
-      vain_leaps = leap(move, solution.proxy, solution.planes) ? 0 : vain_leaps + 1;
+      stayed = !leap(move, solution.proxy, solution.planes);
+      vain_leaps = stayed ? vain_leaps + 1 : 0;
       continue;
     }
     vain_leaps = 0;
-    if (on && (make(move, solution.proxy, solution.planes) || move.room > least_room * tolerance_)) continue;
+    stayed = !on || !make(move, solution.proxy, solution.planes);
+    if (!stayed || (on && move.room > least_room * tolerance_)) continue;
     // At rest, or no move comes nearer: by all that is known to hold it.
     solution.planes = move.around;
     if (there && solution.planes.empty()) solution.proxy = move.flat.point;

@@ -373,6 +373,48 @@ Foot IsoView::nearest(const Vec3& p, double bound, const Place& start) const noe
   return NearestSearch(*this, p, bound, start).run();
 }
 
+Foot IsoView::refined(const Foot& foot, const Vec3& p) const noexcept {
+  constexpr int most_steps = 4;
+  constexpr double farthest = 0.05;  // of a cell, that a walk leaves it off
+  constexpr double least = 1e-12;    // of a cell, that is worth a step
+  constexpr double least_curvature = 1e-4;
+  const CellPolynomial* cell = over(foot.point);
+  if (cell == nullptr) return foot;
+  const double width = cell->width.minCoeff();
+  Vec3 x = foot.point;
+  Vec3 normal = Vec3::Zero();
+  for (int step = 0; step < most_steps; ++step) {
+    const FieldJet jet = cell->jet(x);
+    const double slope = jet.gradient.norm();
+    if (!(slope > 0.0)) return foot;
+    normal = jet.gradient / slope;
+    // Newton's step of half the squared distance along the surface, from where that is passed along the normal.
+    const Vec3 off = p - x;
+    const Mat3 curved = Mat3::Identity() + off.dot(normal) / slope * jet.hessian;
+    const double rise = (threshold - jet.value) / slope;
+    const Vec3 u = normal.unitOrthogonal();
+    const Vec3 v = normal.cross(u);
+    const Vec3 pull = off - rise * (curved * normal);
+    const double uu = u.dot(curved * u);
+    const double uv = u.dot(curved * v);
+    const double vv = v.dot(curved * v);
+    const double determinant = uu * vv - uv * uv;
+    if (!(uu + vv > 0.0) || !(determinant > least_curvature * (uu + vv))) return foot;
+    const double along_u = (vv * u.dot(pull) - uv * v.dot(pull)) / determinant;
+    const double along_v = (uu * v.dot(pull) - uv * u.dot(pull)) / determinant;
+    const Vec3 move = along_u * u + along_v * v + rise * normal;
+    x += move;
+    if (!cell->has_well_inside(x) || !((x - foot.point).norm() <= farthest * width)) return foot;
+    if (move.norm() > least * width) continue;
+    Foot there = foot;
+    there.point = there.at = x;
+    there.distance = (p - x).norm();
+    there.normal = std::copysign(1.0, foot.normal.dot(normal)) * normal;
+    return there;
+  }
+  return foot;
+}
+
 Vec3 IsoView::outward(const Vec3& p) const noexcept {
   FieldJet jet;
   if (!sample(p, jet)) return Vec3::Zero();

@@ -75,6 +75,10 @@ struct IsoView {
   [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
   /// Cells in order of distance, in each the point led downhill by Newton's method.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
+  /// A foot of `p` as exactly as the cell's polynomial tells it, where it lies within one cell: as far as a walk leaves
+  /// it, where the surface is bent about as much as a ball around p is round, the direction to it is not known to what
+  /// a ball at rest takes.
+  [[nodiscard]] Foot refined(const Foot& foot, const Vec3& p) const noexcept;
   [[nodiscard]] IsoSpot at(const Place& place, const Vec3& normal) const noexcept {
     return {place.at, normal, place.side() * normal};
   }
