@@ -135,8 +135,8 @@ Result<LoopState> restore_loop_state(std::span<const std::byte> image, const Sce
     return refuse(ErrorCode::file_malformed, "has a safety stage that there is not", 4);
   const auto number = [&](std::size_t i) { return std::bit_cast<double>(number_of(image.subspan(8 + 8 * i, 8))); };
   LoopState loop;
-  loop.safety = {Vec3(number(0), number(1), number(2)), Seconds(number(3)), fault, raised == 1, armed == 1,
-                 withheld == 1};
+  loop.safety = {
+      Vec3(number(0), number(1), number(2)), Seconds(number(3)), fault, raised == 1, armed == 1, withheld == 1};
   if (!loop.safety.last_force.allFinite() || !(loop.safety.engaged.count() >= 0.0))
     return refuse(ErrorCode::file_malformed, "has a last force that is none", 8);
   ASPERITY_TRY(loop.proxy, restore_state(image.subspan(loop_image_bytes), scene));
