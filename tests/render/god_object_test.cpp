@@ -314,6 +314,38 @@ TEST(GodObject, ProxyIsALocalMinimumOfItsDistanceToTheProbe) {
   }
 }
 
+// Pressed between two edges that are not parallel, a ball rolls along both, and each is round to it.
+TEST(GodObject, ABallBetweenTwoSkewEdgesComesToRest) {
+  constexpr double radius = 1e-3;
+  Rng rng(31);
+  int touching = 0;
+  int between = 0;
+  for (int i = 0; i < 300; ++i) {
+    MeshSource source;
+    for (const double side : {-1.0, 1.0}) {
+      const Vec3 along = Vec3(rng.uniform(-0.8, 0.8), 1.0, rng.uniform(-0.8, 0.8)).normalized();
+      const Vec3 middle(side * rng.uniform(0.2, 0.7) * radius, 0.0, rng.uniform(-0.3, 0.3) * radius);
+      source.positions.push_back(middle - 0.02 * along);
+      source.positions.push_back(middle + 0.02 * along);
+      source.positions.push_back(middle + Vec3(side * 0.03, 0.0, -0.01));
+    }
+    source.triangles = {{0, 1, 2}, {3, 4, 5}};
+    const Scene scene = scene_of(surface_of(std::move(source)), radius);
+    ProxyState state;
+    Vec3 probe(0.0, 0.0, 2e-3);
+    step(scene, state, at(probe), tick);
+    for (int k = 0; k < 60; ++k) {
+      probe += k < 40 ? Vec3(0.0, 0.0, -5e-5) : Vec3(5e-5 * random_direction(rng));
+      const ForceSample felt = step(scene, state, at(probe), tick);
+      touching += felt.flags.has(TickFlag::contact) ? 1 : 0;
+      between += felt.contact.places.size() == 2 ? 1 : 0;
+      ASSERT_FALSE(unfinished(felt.flags)) << "case " << i << ", tick " << k;
+    }
+  }
+  EXPECT_GT(touching, 6000);
+  EXPECT_GT(between, 2000);
+}
+
 // A point is led along the faces, and what holds it on an edge or at a vertex is known from the faces around. The same
 // answer comes of asking for all that it touches, move after move, as several surfaces need it.
 TEST(GodObject, OnEdgesAndAtVerticesItIsHeldAsByAllThatItTouches) {

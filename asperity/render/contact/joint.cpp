@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "asperity/core/principal_axes.h"
+#include "asperity/geometry/triangle_contact.h"
+
 namespace asperity {
 
 namespace {
@@ -333,11 +336,63 @@ Vec3 JointSolve::over_what_is_near(const Vec3& position, double gone, const Vec3
   return goal;
 }
 
+/// Adds planes off what a ball has touched before and is still near to: where it rolls over an edge between others, its
+/// tangent plane holds before that is touched.
+void JointSolve::keep_near(const PlaneSet& earlier, const Vec3& position, PlaneSet& planes) const noexcept {
+  constexpr double near = 0.25;  // of the radius
+  for (const ConstraintPlane& plane : earlier) {
+    const Touched& touch = *entries_[plane.owner].touch;
+    const TriangleMesh& mesh = std::get_if<TriangleView>(&touch.view)->surface().mesh();
+    const std::uint32_t face = plane.contact.element;
+    const auto [a, b, c] = mesh.corners(face);
+    const Vec3 local = touch.to_local(position);
+    const Vec3 front = mesh.face_normal(face);
+    const Foot foot = triangle_foot(face, closest_point_on_triangle(local, a, b, c), local, front, {});
+    const bool behind = touch.facts->sides == Sides::front && front.dot(local - foot.point) < 0.0;
+    if (behind || foot.distance > (1.0 + near) * radius_) continue;
+    const bool there = std::any_of(planes.begin(), planes.end(), [&](const ConstraintPlane& other) {
+      return other.owner == plane.owner && (other.contact.point - foot.point).norm() <= plane.skin;
+    });
+    if (!there) planes.push_back(plane_of(plane.owner, foot));
+  }
+}
+
+/// The step of a ball from `proxy` to where planes would have it, by how round to it the edges are that it rolls along:
+/// along what the planes leave free the squared distance bends by less than itself, and the step is to be longer.
+Vec3 JointSolve::rolled(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy) const noexcept {
+  constexpr double least_curvature = 0.05;
+  const Vec3 step = flat.point - proxy;
+  Mat3 free = Mat3::Identity();
+  if (flat.active.size() == 1) {
+    const Vec3& normal = planes[flat.active[0].plane].normal;
+    free -= normal * normal.transpose();
+  } else if (flat.active.size() == 2) {
+    const Vec3 along = planes[flat.active[0].plane].normal.cross(planes[flat.active[1].plane].normal).normalized();
+    free = along * along.transpose();
+  } else {
+    return step;
+  }
+  Mat3 bends = Mat3::Zero();
+  for (const PlaneProjection::Active& active : flat.active)
+    bends += active.multiplier * bend_of(planes[active.plane], proxy);
+  const PrincipalAxes curvature = principal_axes(Mat3::Identity() - free * bends * free);
+  const Vec3 pull = free * step;
+  Vec3 more = curvature.scaling_by(curvature.values.cwiseMax(least_curvature).cwiseInverse()) * pull - pull;
+  // No farther than the other planes let it.
+  double share = 1.0;
+  for (const ConstraintPlane& plane : planes) {
+    const double room = plane.normal.dot(flat.point) - plane.offset - plane.skin;
+    const double used = -plane.normal.dot(more);
+    if (used > room + 1e-9 * more.norm()) share = std::min(share, std::max(0.0, room / used));
+  }
+  return step + share * more;
+}
+
 /// On triangles alone: from one set of planes to the next.
 void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept {
-  // Rarely needed, from this move on: planes of the last place are kept for one move in four, for valleys so flat that
-  // either side is left before the other is felt; and a ball right above the edge it rolls over may stop, or roll in
-  // larger steps.
+  // Rarely needed, from this move on: planes of the last place are kept, of a point for one move in four, for valleys
+  // so flat that either side is left before the other is felt; a ball rolls in steps that know how round to it the
+  // edges are, and right above the one it rolls over it may stop.
   constexpr int most_moves = 64;
   constexpr int patience = 8;
   constexpr int most_passed = 3;  // moves that may end where nothing is touched any more
@@ -349,6 +404,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
   double gone = 0.0;
   Vec3 nearest = solution.proxy;
   int in_vain = 0;
+  const bool ball = radius_ > 0.0 && !facets_;
   const auto remember_nearest = [&] {
     ++in_vain;
     if (!((solution.proxy - goal).squaredNorm() < (nearest - goal).squaredNorm())) return;
@@ -359,17 +415,18 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     const bool patient = move >= patience;
     if (patient) remember_nearest();
     // The middle of a ball that is led into an edge: it would roll to and fro over that for ever.
-    solution.converged = radius_ > 0.0 && !facets_ && in_vain > patience;
+    solution.converged = ball && in_vain > patience;
     if (solution.converged) break;
     if (patient) earlier = planes;
     planes.clear();
     touched(solution.proxy, planes);
+    if (patient && ball) keep_near(earlier, solution.proxy, planes);
     const bool rolling = move > 0 && planes.size() == 1 && rolls(planes[0]);
     Vec3 target = planes.size() == 1 ? onto_plane(goal, planes[0]) : project_onto_planes(goal, planes, true).point;
     const bool passed = planes.empty() && move > 0 && move <= most_passed;
     if (passed && radius_ > 0.0) target = over_what_is_near(solution.proxy, gone, goal);
     const Vec3 foot = rolling ? entries_[planes[0].owner].touch->to_world(planes[0].contact.point) : goal;
-    if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target);
+    if (rolling) target = rolling_target(planes[0], foot, edge_of(planes[0]), goal, target, patient ? 0.01 : 0.2);
     Vec3 step = target - solution.proxy;
     if (step.norm() <= tolerance_) {
       // Without contact nothing may remain between proxy and probe: free space gives no force at all.
@@ -387,7 +444,9 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
         solution.converged = std::exchange(distance, now) - now < least_gain * now;
         if (solution.converged) return;
       }
-    } else if (patient && move % 4 == 0) {
+    } else if (patient && ball && in_vain < 2) {
+      step = rolled(planes, project_onto_planes(goal, planes, true), solution.proxy);
+    } else if (patient && !ball && move % 4 == 0) {
       PlaneSet both = planes;
       for (const ConstraintPlane& plane : earlier) both.push_back(plane);
       step = project_onto_planes(goal, both, true).point - solution.proxy;

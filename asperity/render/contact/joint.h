@@ -155,6 +155,8 @@ class JointSolve {
   [[nodiscard]] double free_share_of_ball(Entry& entry, const Segment& motion) noexcept;
   [[nodiscard]] bool advance(const Vec3& step, const Vec3& goal, Vec3& proxy) noexcept;
   [[nodiscard]] Vec3 over_what_is_near(const Vec3& position, double gone, const Vec3& goal) noexcept;
+  void keep_near(const PlaneSet& earlier, const Vec3& position, PlaneSet& planes) const noexcept;
+  [[nodiscard]] Vec3 rolled(const PlaneSet& planes, const PlaneProjection& flat, const Vec3& proxy) const noexcept;
   void settle_on_triangles(const Vec3& goal, ConstraintSolution& solution) noexcept;
   void settle_among_smooth(const Vec3& goal, ConstraintSolution& solution) noexcept;
   using CutSet = FixedVector<ConstraintPlane, 8>;

@@ -73,11 +73,10 @@ struct ConstraintSolution {
 /// Where a ball that rests on one edge or corner is led: onto the ray from there to the goal, and along the edge
 /// (`edge`: unit, zero on a corner) as far as the goal. The edge's offset is round; the nearest point of its tangent
 /// plane would be approached in many small rolls, this one is reached in two. With the goal near the edge itself every
-/// direction is nearly as good, and the ray is no guide. [servo]
+/// direction is nearly as good, and the ray is no guide: nearer than `least_distance` (of the ball's radius). [servo]
 inline Vec3 rolling_target(const ConstraintPlane& plane, const Vec3& foot, const Vec3& edge, const Vec3& goal,
-                           const Vec3& otherwise) noexcept {
+                           const Vec3& otherwise, double least_distance) noexcept {
   constexpr double least_cosine = 0.7;
-  constexpr double least_distance = 0.2;  // of the ball's radius
   const Vec3 slide = edge.dot(goal - foot) * edge;
   const Vec3 towards = goal - foot - slide;
   const double radius = plane.offset + plane.skin - plane.normal.dot(foot);
