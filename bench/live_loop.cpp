@@ -16,7 +16,6 @@
 
 #include "asperity/io/experiment.h"
 #include "asperity/io/recorder.h"
-#include "asperity/render/step.h"
 #include "asperity/servo/device_process.h"
 #include "asperity/servo/servo_thread.h"
 
@@ -32,17 +31,12 @@ struct Options {
   std::string trace;
 };
 
-struct Step {
-  ProxyState state = {};
-  ForceSample operator()(const LiveScene& felt, const ProbeSample& probe, Seconds dt) noexcept {
-    return step(felt.scene, state, *felt.cache, probe, dt);
-  }
-};
+/// Tells the hub, and sees that the safety stage has looked at what is sent.
 struct Feed {
-  std::shared_ptr<Telemetry<ProxyState>> telemetry;
+  SceneFeed hub;
   std::uint64_t* unchecked;
-  void operator()(const LiveTick<LiveScene, Step>& tick) const noexcept {
-    telemetry->put(tick, tick.felt.number, tick.step.state);
+  void operator()(const LiveTick<LiveScene, SceneStep>& tick) const noexcept {
+    hub(tick);
     if (tick.record.commanded != tick.safety.last_force()) ++*unchecked;
   }
 };
@@ -81,7 +75,7 @@ Status measure_overhead(const Experiment& experiment) {
   const auto telemetry = std::make_shared<Telemetry<ProxyState>>();
   const auto reader = telemetry->read(1'000'000'000);
   std::uint64_t unchecked = 0;
-  const Feed feed{telemetry, &unchecked};
+  const Feed feed{{telemetry}, &unchecked};
   SharedPort port(board);
   const Seconds dt(1.0 / experiment.rate);
   std::vector<ProbeSample> probes;
@@ -90,7 +84,7 @@ Status measure_overhead(const Experiment& experiment) {
     path.apply(Vec3::Zero(), dt);
   }
   LoopMeters meters;
-  std::array<Step, 4> steps;
+  std::array<SceneStep, 4> steps;
   std::array<std::vector<double>, 3> extra;
   TelemetryReader<ProxyState>::Batch batch;
   for (std::size_t begin = 0, round = 0; round < rounds; begin += turn) {
@@ -102,7 +96,7 @@ Status measure_overhead(const Experiment& experiment) {
     // Whoever is first finds nothing in the processor's caches: each in its turn.
     for (std::size_t i = 0; i < took.size(); ++i) {
       const std::size_t with = (i + begin / turn) % took.size();
-      Step& in_turn = steps[with];
+      SceneStep& in_turn = steps[with];
       OfflineClock clock(dt);
       Played played{&probes[begin], with >= 2 ? &port : nullptr};
       const auto render = [&](const ProbeSample& probe, Seconds length) noexcept {
@@ -110,7 +104,7 @@ Status measure_overhead(const Experiment& experiment) {
       };
       const TickNotes notes;
       const auto record = [&](const TraceRecord& tick) noexcept {
-        if (with == 3) feed(LiveTick<LiveScene, Step>{tick, notes, *felt, in_turn, safety});
+        if (with == 3) feed(LiveTick<LiveScene, SceneStep>{tick, notes, *felt, in_turn, safety});
       };
       const std::int64_t first = SteadyTime::now();
       if (with == 0) {
@@ -157,10 +151,10 @@ Status measure_live(const Options& options, const Experiment& experiment) {
   servo.safety = SafetySettings::from_profile(experiment.device);
   servo.longest_step = Seconds(0.05);
   std::uint64_t unchecked = 0;
-  using Loop = ServoThread<LiveScene, Step, PortDevice<SharedPort>, Feed>;
+  using Loop = ServoThread<LiveScene, SceneStep, PortDevice<SharedPort>, Feed>;
   ASPERITY_TRY(const auto loop,
                Loop::start(scenes->begin(experiment.scene), {},
-                           PortDevice<SharedPort>(SharedPort(board), Seconds(0.05)), {telemetry, &unchecked}, servo));
+                           PortDevice<SharedPort>(SharedPort(board), Seconds(0.05)), {{telemetry}, &unchecked}, servo));
   for (const RealtimeGrant& grant : loop->grants())
     fmt::print("{} {}{}\n", grant.got ? "got" : "no ", grant.asked, grant.got ? "" : ": " + grant.why);
   const auto begin = std::chrono::steady_clock::now();

@@ -21,7 +21,6 @@
 #include "asperity/core/units.h"
 #include "asperity/io/live_trace.h"
 #include "asperity/io/recorder.h"
-#include "asperity/render/step.h"
 #include "asperity/servo/device_process.h"
 #include "asperity/servo/servo_thread.h"
 
@@ -45,24 +44,8 @@ struct DueEdit {
   std::string text;
 };
 
-/// Renders what is touched.
-struct LiveStep {
-  ProxyState state = {};
-  ForceSample operator()(const LiveScene& felt, const ProbeSample& probe, Seconds dt) noexcept {
-    return step(felt.scene, state, *felt.cache, probe, dt);
-  }
-};
-
-/// Tells the hub.
-struct LiveFeed {
-  std::shared_ptr<Telemetry<ProxyState>> telemetry;
-  void operator()(const LiveTick<LiveScene, LiveStep>& tick) const noexcept {
-    telemetry->put(tick, tick.felt.number, tick.step.state);
-  }
-};
-
 using LivePort = PortDevice<SharedPort>;
-using LiveLoop = ServoThread<LiveScene, LiveStep, LivePort, LiveFeed>;
+using LiveLoop = ServoThread<LiveScene, SceneStep, LivePort, SceneFeed>;
 
 // How long the device may be silent, and a step may take, before it counts as a fault.
 constexpr Seconds longest_silence{0.05};
@@ -235,6 +218,8 @@ class LiveSession {
       for (; next < edits_.size() && edits_[next].seconds <= seconds; ++next) change(edits_[next].edit);
       look();
       line_.show(status_text());
+      // By the clock on the wall: ticks that were missed take their time as well.
+      if (options_.seconds > 0.0 && seconds >= options_.seconds) quit_ = true;
       if (felt_.fault != Fault::none && !lines_.from_a_person()) quit_ = true;
     }
   }

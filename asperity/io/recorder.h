@@ -14,6 +14,7 @@
 #include "asperity/render/scene.h"
 #include "asperity/render/scene_edit.h"
 #include "asperity/render/state.h"
+#include "asperity/render/step.h"
 #include "asperity/servo/telemetry.h"
 
 namespace asperity {
@@ -23,6 +24,24 @@ struct LiveScene {
   Scene scene;
   std::shared_ptr<ProxyCache> cache;  ///< the servo thread's; an edit goes on with the one before
   std::uint64_t number = 0;           ///< of its SceneLog, above 0
+};
+
+/// Renders what a live loop touches: the Step of its ServoThread.
+struct SceneStep {
+  ProxyState state = {};
+  /// [servo]
+  ForceSample operator()(const LiveScene& felt, const ProbeSample& probe, Seconds dt) noexcept {
+    return step(felt.scene, state, *felt.cache, probe, dt);
+  }
+};
+
+/// Tells the hub of each tick: its Record.
+struct SceneFeed {
+  std::shared_ptr<Telemetry<ProxyState>> telemetry;
+  /// [servo]
+  void operator()(const LiveTick<LiveScene, SceneStep>& tick) const noexcept {
+    telemetry->put(tick, tick.felt.number, tick.step.state);
+  }
 };
 
 /// Every scene that is handed to a live loop, by number, with how it came about: so that a recorder that hears of a

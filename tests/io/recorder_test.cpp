@@ -63,19 +63,7 @@ struct Poking {
   [[nodiscard]] bool finished() const noexcept { return false; }
 };
 
-struct Step {
-  ProxyState state = {};
-  ForceSample operator()(const LiveScene& felt, const ProbeSample& probe, Seconds dt) noexcept {
-    return step(felt.scene, state, *felt.cache, probe, dt);
-  }
-};
-struct Feed {
-  std::shared_ptr<Telemetry<ProxyState>> telemetry;
-  void operator()(const LiveTick<LiveScene, Step>& tick) const noexcept {
-    telemetry->put(tick, tick.felt.number, tick.step.state);
-  }
-};
-using Loop = ServoThread<LiveScene, Step, Poking, Feed>;
+using Loop = ServoThread<LiveScene, SceneStep, Poking, SceneFeed>;
 
 /// A session that records itself.
 struct Session {
