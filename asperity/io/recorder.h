@@ -45,7 +45,8 @@ struct SceneFeed {
 };
 
 /// Every scene that is handed to a live loop, by number, with how it came about: so that a recorder that hears of a
-/// number later can tell. The first is the one that the trace's metadata hold. Each step is shared by any threads.
+/// number later can tell. The first is the one that the trace's metadata hold. Steps are kept until somebody asks for
+/// later ones. For any threads.
 class SceneLog {
  public:
   /// [build]
@@ -78,10 +79,11 @@ class SceneLog {
 
 /// Where and how a session is kept.
 struct RecorderSettings {
-  std::string path;          ///< of the trace
-  std::string fault_prefix;  ///< of traces that faults leave: "out/fault" makes out/fault-1.asptrace; empty: none
+  std::string path;  ///< of the trace
+  std::string
+      fault_prefix;  ///< of traces that faults leave, at most 32: "out/fault" makes out/fault-1.asptrace; empty: none
   TraceMetadata metadata;
-  std::chrono::milliseconds flush{40};  ///< so long at most a tick stays in the program alone; 1 or more
+  std::chrono::milliseconds flush{40};  ///< so long at most a tick stays in the program alone; 2 or more
   Seconds before{2.0};                  ///< of ticks that a fault's trace begins before it, at least
   Seconds after{0.1};                   ///< and goes on behind it
 };
@@ -99,7 +101,7 @@ struct RecorderStatus {
 /// the trace, which are counted, and nothing else.
 class Recorder {
  public:
-  /// Begins the file. Errors: file_unwritable. [build]
+  /// Begins the file. Errors: file_unwritable, bad_value (flush). [build]
   static Result<std::unique_ptr<Recorder>> start(std::shared_ptr<TelemetryReader<ProxyState>> reader,
                                                  std::shared_ptr<SceneLog> scenes, const RecorderSettings& settings);
   /// As finish().

@@ -89,9 +89,8 @@ struct SafetyMemory {
 ///  4. the magnitude is limited, direction kept (force_limited): for `engage` after it was let in to less;
 ///  5. the change since the last tick is limited to slew_limit * dt (slew_limited). Targets of zero are reached by this
 ///     ramp as well: a sudden drop is a kick too;
-///  6. what leads out of the workspace is cut near its border, and all of it beyond (at_border), and what the force
-///  does
-///     to the hand per second, direction kept (power_limited): at once, for both only make it smaller.
+///  6. what leads out of the workspace is cut near its border, and all of it beyond (at_border); and what the force
+///     does to the hand per second, direction kept (power_limited): at once, for both only make it smaller.
 /// For every sequence of inputs the output is finite, at most `max_force`, within 6, and but for 6 changes by at most
 /// slew_limit * dt.
 /// Limiting the magnitude is passive, limiting the slew is not (formulation.md, amendment 6): an energy observer

@@ -1,6 +1,7 @@
 #pragma once
 // What a live loop tells, brought from the servo thread to any number of readers that it never waits for.
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -103,7 +104,7 @@ class TelemetryReader {
 /// How much of what a loop tells is kept until somebody has taken it.
 struct TelemetrySettings {
   std::size_t ticks = 4096;              ///< between the servo thread and the hub, 1 or more
-  std::uint64_t key_frame_every = 1000;  ///< ticks, 1 or more
+  std::uint64_t key_frame_every = 1000;  ///< ticks; 0 counts as 1
 };
 
 /// The hub: takes what the servo thread puts and hands it to every reader, on a thread of its own. The servo thread
@@ -112,7 +113,7 @@ template <class State>
 class Telemetry {
  public:
   explicit Telemetry(const TelemetrySettings& settings = {})
-      : ticks_(settings.ticks), key_frames_(8), key_frame_every_(settings.key_frame_every) {
+      : ticks_(settings.ticks), key_frames_(8), key_frame_every_(std::max<std::uint64_t>(1, settings.key_frame_every)) {
     thread_ = std::thread([this] { hand_on(); });
   }
   /// What is left goes to the readers first.

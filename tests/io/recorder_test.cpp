@@ -305,6 +305,90 @@ TEST(Recorder, AFaultLeavesTheTicksBeforeItWithItsCause) {
   fs::remove_all(folder);
 }
 
+/// A tick of a session that was never run.
+struct Told {
+  TraceRecord record;
+  TickNotes notes;
+  LiveScene felt;
+  SceneStep step;
+  SafetyStage safety = SafetyStage::build({}).value();
+  explicit Told(const std::shared_ptr<const LiveScene>& scene) : felt(*scene) { record.dt = Seconds(1e-3); }
+  void tell(Telemetry<ProxyState>& telemetry, Fault fault) {
+    SafetyMemory memory = safety.memory();
+    memory.fault = fault;
+    safety.restore(memory);
+    telemetry.put(LiveTick<LiveScene, SceneStep>{record, notes, felt, step, safety}, felt.number, step.state);
+    ++record.tick;
+  }
+};
+
+TEST(Recorder, KeepsFewOfManyFaultsAndNeverMoreThanItNeeds) {
+  const fs::path folder = empty_folder("many");
+  const Experiment e = experiment();
+  const auto scenes = std::make_shared<SceneLog>();
+  // No key frame ever: what is held has to end all the same.
+  auto telemetry =
+      std::make_shared<Telemetry<ProxyState>>(TelemetrySettings{.ticks = 65536, .key_frame_every = 1u << 30});
+  RecorderSettings settings;
+  settings.path = (folder / "live.asptrace").string();
+  settings.fault_prefix = (folder / "fault").string();
+  settings.metadata.scene = e.canonical_json;
+  settings.before = Seconds(0.1);
+  settings.after = Seconds(0.005);
+  const auto recorder = Recorder::start(telemetry->read(100'000), scenes, settings).value();
+  Told told(scenes->begin(e.scene));
+  for (int i = 0; i < 1000; ++i) told.tell(*telemetry, Fault::none);
+  for (int i = 0; i < 40; ++i) {
+    for (int k = 0; k < 10; ++k) told.tell(*telemetry, Fault::too_fast);
+    for (int k = 0; k < 20; ++k) told.tell(*telemetry, Fault::none);
+  }
+  telemetry->end();
+  ASSERT_TRUE(recorder->finish());
+  const RecorderStatus status = recorder->status();
+  EXPECT_EQ(status.ticks, told.record.tick);
+  EXPECT_EQ(status.faults.size(), 32u);
+  EXPECT_NE(status.fault_problem.find("more than 32"), std::string::npos) << status.fault_problem;
+  const Trace first = read_trace(status.faults[0]).value();
+  EXPECT_GE(first.records.size(), 100u);
+  EXPECT_LE(first.records.size(), 410u) << "four times as long, where there are no key frames";
+  EXPECT_NEAR(static_cast<double>(first.records.back().tick), 1005.0, 1.0) << "and what came within 5 ms of it";
+  for (const auto& file : fs::directory_iterator(folder)) EXPECT_NE(file.path().extension(), ".part");
+  fs::remove_all(folder);
+}
+
+TEST(Recorder, OfANumberThatIsTurnedAgainAndAgainAFaultsTraceHoldsTheLast) {
+  const fs::path folder = empty_folder("turned");
+  const Experiment e = experiment();
+  const auto scenes = std::make_shared<SceneLog>();
+  auto telemetry = std::make_shared<Telemetry<ProxyState>>(TelemetrySettings{.ticks = 65536, .key_frame_every = 50});
+  RecorderSettings settings;
+  settings.path = (folder / "live.asptrace").string();
+  settings.fault_prefix = (folder / "fault").string();
+  settings.metadata.scene = e.canonical_json;
+  settings.before = Seconds(0.1);
+  const auto recorder = Recorder::start(telemetry->read(100'000), scenes, settings).value();
+  Told told(scenes->begin(e.scene));
+  const auto change = [&](SceneEditKind kind, double value) {
+    told.felt = *scenes->edit({kind, "", value, ""}).value();
+    for (int k = 0; k < 5; ++k) told.tell(*telemetry, Fault::none);
+  };
+  for (int i = 0; i < 100; ++i) change(SceneEditKind::stiffness, 300.0 + i);
+  change(SceneEditKind::zoom, 2.0);
+  for (int i = 0; i < 100; ++i) change(SceneEditKind::stiffness, 500.0 + i);
+  for (int k = 0; k < 500; ++k) told.tell(*telemetry, Fault::none);
+  told.tell(*telemetry, Fault::too_fast);
+  telemetry->end();
+  ASSERT_TRUE(recorder->finish());
+  ASSERT_EQ(recorder->status().faults.size(), 1u);
+  const Trace trace = read_trace(recorder->status().faults[0]).value();
+  std::vector<std::string> edits;
+  for (const TraceEvent& event : trace.events) edits.push_back(event.text);
+  EXPECT_EQ(edits, (std::vector<std::string>{to_json(SceneEdit{SceneEditKind::stiffness, "", 399.0, ""}),
+                                             to_json(SceneEdit{SceneEditKind::zoom, "", 2.0, ""}),
+                                             to_json(SceneEdit{SceneEditKind::stiffness, "", 599.0, ""})}));
+  fs::remove_all(folder);
+}
+
 TEST(Recorder, RefusesAFileThatCannotBe) {
   const auto telemetry = std::make_shared<Telemetry<ProxyState>>();
   RecorderSettings settings;
@@ -312,6 +396,9 @@ TEST(Recorder, RefusesAFileThatCannotBe) {
   const auto recorder = Recorder::start(telemetry->read(10), std::make_shared<SceneLog>(), settings);
   ASSERT_FALSE(recorder);
   EXPECT_EQ(recorder.error().code, ErrorCode::file_unwritable);
+  settings.path = "/dev/null";
+  settings.flush = std::chrono::milliseconds(1);
+  EXPECT_EQ(Recorder::start(telemetry->read(10), std::make_shared<SceneLog>(), settings).error().place, "flush");
 }
 
 TEST(SceneLog, NumbersEveryStepAndForgetsWhatIsPast) {

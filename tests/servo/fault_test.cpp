@@ -47,6 +47,16 @@ struct Live {
   [[nodiscard]] bool is_free() const { return put_out() == std::array<double, 3>{}; }
 };
 
+/// Pushes until it is felt, then with a force that is no number until none is.
+template <class L>
+void break_the_force_of(L& live) {
+  ASSERT_TRUE(comes([&] { return live.pushes(); }));
+  Pushing broken;
+  broken.not_a_number = true;
+  live.loop->put(std::make_shared<const Pushing>(broken));
+  ASSERT_TRUE(comes([&] { return live.is_free(); }));
+}
+
 /// The device had its force, then the fault came: no force after at most `most_ms` of the loop's own time from the
 /// first tick in which it could be seen, none from there on, and nobody was pushed harder meanwhile.
 void expect_ended(const Kept& kept, Fault fault, double most_ms = 5.0) {
@@ -79,11 +89,7 @@ void expect_let_go_by(const std::vector<PutOut>& all) {
 
 TEST(Fault, AForceThatIsNoNumberEndsTheForceUntilItIsAcknowledged) {
   Live<> live;
-  ASSERT_TRUE(comes([&] { return live.pushes(); }));
-  Pushing broken;
-  broken.not_a_number = true;
-  live.loop->put(std::make_shared<const Pushing>(broken));
-  ASSERT_TRUE(comes([&] { return live.is_free(); }));
+  ASSERT_NO_FATAL_FAILURE(break_the_force_of(live));
   // All is well again, but nobody has seen it yet.
   live.loop->put(std::make_shared<const Pushing>());
   sleep_for_ms(50);
@@ -96,11 +102,7 @@ TEST(Fault, AForceThatIsNoNumberEndsTheForceUntilItIsAcknowledged) {
 
 TEST(Fault, OnceAcknowledgedTheForceComesBackFromNothing) {
   Live<> live;
-  ASSERT_TRUE(comes([&] { return live.pushes(); }));
-  Pushing broken;
-  broken.not_a_number = true;
-  live.loop->put(std::make_shared<const Pushing>(broken));
-  ASSERT_TRUE(comes([&] { return live.is_free(); }));
+  ASSERT_NO_FATAL_FAILURE(break_the_force_of(live));
   Pushing nothing;
   nothing.newtons = 0.0;
   live.loop->put(std::make_shared<const Pushing>(nothing));

@@ -501,6 +501,37 @@ TEST(ReliefSearch, feet_are_the_same_to_the_bit_whatever_is_kept_of_earlier_look
   EXPECT_GT(felt, 500);
 }
 
+TEST(ReliefSearch, the_room_around_a_ball_is_never_told_too_large_and_often_told_whole) {
+  Rng rng(81);
+  const std::vector<Searched> all = reliefs();
+  ReliefBlocks kept;
+  int whole = 0;
+  int near = 0;
+  int told_whole = 0;
+  for (std::size_t round = 0; round < 2 * all.size(); ++round) {
+    const Searched& one = all[round % all.size()];
+    SurfaceCache with;
+    with.blocks = &kept;
+    SurfaceCache without;
+    for (int i = 0; i < 60; ++i) {
+      const Vec3 p = random_near(rng, one.dense.index.mesh(), 2e-3);
+      const double within = std::pow(10.0, rng.uniform(-4.0, -2.7));
+      const double room = one.surface->view(with, {}).room_around(p, within);
+      ASSERT_EQ(room, one.surface->view(without, {}).room_around(p, within)) << one.name << ", case " << i;
+      SurfaceCache plain;
+      const Foot foot = one.surface->view(plain, {}).nearest(p, infinity);
+      ASSERT_TRUE(foot.found());
+      // Rounded off as what is kept of it is.
+      ASSERT_LE(room, std::min(within, foot.distance * (1.0 + 1e-9))) << one.name << ", case " << i;
+      whole += foot.distance > within ? 1 : 0;
+      near += foot.distance < within ? 1 : 0;
+      told_whole += room == within ? 1 : 0;
+    }
+  }
+  EXPECT_GT(near, 200) << "something was in the way";
+  EXPECT_GT(told_whole, whole / 4);
+}
+
 TEST(ReliefSearch, a_ball_stops_at_its_radius_from_the_dense_mesh) {
   Rng rng(74);
   for (const Searched& one : reliefs()) {

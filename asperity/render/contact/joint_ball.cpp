@@ -278,10 +278,9 @@ double JointSolve::free_around(const Vec3& position, double far) noexcept {
     if (!entry.smooth) continue;
     const double around = radius_ + gap(entry);
     const Vec3 local = entry.touch->to_local(position);
-    if (const auto* relief = std::get_if<ReliefView>(&entry.touch->view)) {
-      free = std::max(0.0, std::min(free, relief->room_around(local, free + around) - around));
-      continue;
-    }
+    // Mostly nothing is that near, and a bound tells so that is looked up.
+    const auto* const relief = std::get_if<ReliefView>(&entry.touch->view);
+    if (relief != nullptr && relief->room_around(local, free + around) >= free + around) continue;
     const Foot foot = on_smooth_view(entry.touch->view,
                                      [&](const auto& view) { return view.nearest(local, free + around, entry.near); });
     if (foot.found()) free = std::max(0.0, std::min(free, foot.distance - around));

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "asperity/core/processor.h"
-#include "asperity/surface/detail/four.h"
+#include "asperity/surface/relief/detail/four_prisms.h"
 #include "asperity/surface/relief/detail/partners.h"
 #include "asperity/surface/relief/surface.h"
 
@@ -85,22 +85,12 @@ void ReliefSurface::heights_alone(const ReliefFrame& frame, const Lanes& u, cons
 namespace {
 
 /// Of the shell's points at four places from a point, squared.
-ASPERITY_FOUR void squares_of_four(const ShellPrism& prism, const Lanes& at_u, const Lanes& at_v,
-                                   const Lanes& at_height, const Vec3& from, Lanes& squares) {
-  using four::Wide;
-  Wide u;
-  Wide v;
-  Wide height;
-  std::memcpy(&u, at_u.data(), sizeof(u));
-  std::memcpy(&v, at_v.data(), sizeof(v));
-  std::memcpy(&height, at_height.data(), sizeof(height));
-  Wide sum{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const Wide base = prism.corner[axis] + u * prism.edge_u[axis] + v * prism.edge_v[axis];
-    const Wide direction = prism.direction[axis] + u * prism.turn_u[axis] + v * prism.turn_v[axis];
-    const Wide off = base + height * direction - from[axis];
-    sum += off * off;
-  }
+ASPERITY_FOUR void squares_of_four(const ShellPrism& prism, const Lanes& u, const Lanes& v, const Lanes& heights,
+                                   const Vec3& from, Lanes& squares) {
+  four::Vectors off;
+  four::offsets(prism, u, v, heights, from, off);
+  four::Wide sum{};
+  for (const four::Wide& one : off) sum += one * one;
   std::memcpy(squares.data(), &sum, sizeof(sum));
 }
 

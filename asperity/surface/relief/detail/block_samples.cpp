@@ -9,7 +9,7 @@
 #endif
 
 #include "asperity/core/processor.h"
-#include "asperity/surface/detail/four.h"
+#include "asperity/surface/relief/detail/four_prisms.h"
 
 namespace asperity {
 
@@ -170,21 +170,11 @@ ASPERITY_FOUR void around_by_eight(const ReliefDisk& part, const BlockSamples& s
   }
 }
 
-ASPERITY_FOUR void points_by_four(const ShellPrism& prism, const Lanes& at_u, const Lanes& at_v, const Lanes& at_height,
+ASPERITY_FOUR void points_by_four(const ShellPrism& prism, const Lanes& u, const Lanes& v, const Lanes& heights,
                                   const Vec3& middle, Lanes (&off)[3]) {
-  using four::Wide;
-  Wide u;
-  Wide v;
-  Wide height;
-  std::memcpy(&u, at_u.data(), sizeof(u));
-  std::memcpy(&v, at_v.data(), sizeof(v));
-  std::memcpy(&height, at_height.data(), sizeof(height));
-  for (int axis = 0; axis < 3; ++axis) {
-    const Wide base = prism.corner[axis] + u * prism.edge_u[axis] + v * prism.edge_v[axis];
-    const Wide direction = prism.direction[axis] + u * prism.turn_u[axis] + v * prism.turn_v[axis];
-    const Wide there = base + height * direction - middle[axis];
-    std::memcpy(off[axis].data(), &there, sizeof(there));
-  }
+  four::Vectors there;
+  four::offsets(prism, u, v, heights, middle, there);
+  for (std::size_t axis = 0; axis < 3; ++axis) std::memcpy(off[axis].data(), &there[axis], sizeof(there[axis]));
 }
 
 #if defined(__x86_64__)

@@ -1,13 +1,31 @@
 #pragma once
-// Four prisms of a shell side by side. Private to surface.
+// Four prisms of a shell side by side, or four places of one. Private to surface.
 
 #include <cstdint>
+#include <cstring>
 
+#include "asperity/core/lanes.h"
 #include "asperity/surface/detail/four.h"
 #include "asperity/surface/height_form.h"
 #include "asperity/surface/relief/detail/slabs.h"
 
 namespace asperity::four {
+
+/// From a point to the shell's points at four places of one prism, at heights over its base (m). [servo]
+ASPERITY_FOUR void offsets(const ShellPrism& prism, const Lanes& at_u, const Lanes& at_v, const Lanes& at_height,
+                           const Vec3& from, Vectors& off) {
+  Wide u;
+  Wide v;
+  Wide height;
+  std::memcpy(&u, at_u.data(), sizeof(u));
+  std::memcpy(&v, at_v.data(), sizeof(v));
+  std::memcpy(&height, at_height.data(), sizeof(height));
+  for (int axis = 0; axis < 3; ++axis) {
+    const Wide base = prism.corner[axis] + u * prism.edge_u[axis] + v * prism.edge_v[axis];
+    const Wide direction = prism.direction[axis] + u * prism.turn_u[axis] + v * prism.turn_v[axis];
+    off[static_cast<std::size_t>(axis)] = base + height * direction - from[axis];
+  }
+}
 
 /// ShellPrism, four times.
 struct Prisms {
