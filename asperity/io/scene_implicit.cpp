@@ -249,6 +249,11 @@ class ImplicitReader {
     reach.outside += texture;
     reach.inside += texture;
     const Box& bounds = mesh_->mesh().bounds();
+    const double largest = bounds.extent().maxCoeff();
+    if (texture > largest && !coat_)
+      reader_.fail("texture.amplitude", "reaches " + format_length(texture) + ", farther than the mesh is large",
+                   "at most " + format_length(largest));
+    ASPERITY_CHECK(reader_.status());
     const ConversionSettings settings = read_conversion(reader_, bounds, reach);
     ASPERITY_CHECK(reader_.status());
     ASPERITY_TRY(ConvertedMesh converted, placed(convert_mesh(mesh_->index(), settings, context_.progress)));

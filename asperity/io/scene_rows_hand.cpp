@@ -33,7 +33,7 @@ void scene(SceneObject& row) {
   row("budget", Type::integer(0, 1000000),
       "What a force update may look at, in evaluations of a surface, about 0.1 us each; 0: no limit. What does not fit "
       "is gone on with in the next updates.",
-      or_else("600 for a point, 0 for a ball"), by_contents("less than 100 but 0"));
+      or_else("600 for a point, 150,000 for a ball"), by_contents("less than 100 but 0"));
 }
 
 void probe(SceneObject& row) {

@@ -194,6 +194,7 @@ TEST_F(ImplicitScene, WrongKeysAreNamed) {
       {R"({"offset":"-1 mm"})", "surfaces[0].implicit.offset"},
       {R"({"redistance":"none"})", "surfaces[0].implicit.redistance"},
       {R"({"resolution":40,"texture":{"amplitude":0}})", "surfaces[0].implicit.texture.amplitude"},
+      {R"({"resolution":40,"texture":{"amplitude":2.5}})", "surfaces[0].implicit.texture.amplitude"},
       {R"({"resolution":40,"texture":{"type":"gaussian","wavelength":1}})", "surfaces[0].implicit.texture.wavelength"},
       {R"({"resolution":40,"materials":[{"centre":[0,0.02,0]}]})", "surfaces[0].implicit.materials[0].stiffness"},
       {R"({"resolution":40,"materials":[{"centre":[0,0.02,0],"radius":"1 mm","falloff":"2 mm","stiffness":1}]})",

@@ -411,7 +411,7 @@ void JointSolve::settle_on_triangles(const Vec3& goal, ConstraintSolution& solut
     nearest = solution.proxy;
     in_vain = 0;
   };
-  for (int move = 0; move < most_moves && !work_.spent(); ++move) {
+  for (int move = 0; move < most_moves && (ball || !work_.spent()); ++move) {
     const bool patient = move >= patience;
     if (patient) remember_nearest();
     // The middle of a ball that is led into an edge: it would roll to and fro over that for ever.
@@ -508,7 +508,7 @@ ConstraintSolution JointSolve::solve(const Vec3& from, const Vec3& goal) noexcep
       if (!solution.settled() && solution.projection.active.empty()) share_out(goal, solution);
       return solution;
     }
-    if (radius_ > 0.0 && !facets_) {
+    if (leads_ball()) {
       settle_ball(goal, solution);
     } else {
       settle_among_smooth(goal, solution);

@@ -105,6 +105,8 @@ class JointSolve {
 
   /// Whether it is a point, and led along the surfaces themselves.
   [[nodiscard]] bool leads_point() const noexcept { return radius_ == 0.0 && smooth_ && !facets_; }
+  /// Or a ball, by all that it may rest on.
+  [[nodiscard]] bool leads_ball() const noexcept { return radius_ > 0.0 && smooth_ && !facets_; }
   [[nodiscard]] double margin() const noexcept { return leads_point() ? margin_ : std::max(margin_, blown_up_); }
   [[nodiscard]] double gap(const Entry& entry) const noexcept { return margin() + entry.skin; }
   [[nodiscard]] bool touches(const Held& held, const Vec3& position) const noexcept;
@@ -169,6 +171,12 @@ class JointSolve {
     constexpr double most_gaps = 100.0;
     return off <= most_gaps * (margin() + widest_skin_) + tolerance_;
   }
+  /// Whether the budget is spent. A ball, of which one look may take all of it, comes nearer first. [servo]
+  [[nodiscard]] bool may_end() const noexcept { return work_.spent() && (nearer_ || !leads_ball()); }
+  /// Whether a ball was still on its way there. [servo]
+  [[nodiscard]] bool was_cut(const ConstraintSolution& solution) const noexcept {
+    return leads_ball() && !solution.converged && work_.spent();
+  }
   void recall(const Vec3& position, PlaneSet& planes) noexcept;
   [[nodiscard]] double free_around(const Vec3& position, double far) noexcept;
   [[nodiscard]] double swept_share(const Segment& motion, CutSet& met) noexcept;
@@ -200,6 +208,7 @@ class JointSolve {
     PlaneSet planes;
   } last_feet_;
   FixedVector<Followed, 48> followed_;
+  bool nearer_ = false;                   ///< a ball has come nearer to the goal by what is worth a tick
   bool following_ = false;                ///< nothing is looked for beside these
   FixedVector<ConstraintPlane, 6> feet_;  ///< found while the ball moved
   bool met_ = false;                      ///< the last advance has found more of them

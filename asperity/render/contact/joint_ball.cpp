@@ -319,6 +319,7 @@ double JointSolve::overlap(const PlaneSet& planes, const Vec3& position) noexcep
 bool JointSolve::restore(Vec3& position, PlaneSet& around, CutSet& met) noexcept {
   const double room = found_of_margin * (margin() + widest_skin_);
   for (int round = 0; round < most_restores; ++round) {
+    if (round > 0 && !following_ && may_end()) return false;
     around.clear();
     touched(position, around);
     if (overlap(around, position) <= room) return true;
@@ -439,7 +440,7 @@ bool JointSolve::leap(const BallMove& move, Vec3& proxy, PlaneSet& planes) noexc
   PlaneSet there = planes;
   bool rests = false;
   following_ = true;
-  for (int i = 0; i < most_moves && !work_.spent(); ++i) {
+  for (int i = 0; i < most_moves && !may_end(); ++i) {
     inner.room = std::min(inner.room, longest_stride * radius_ - (place - proxy).norm());
     if (inner.room <= tolerance_) break;
     rests = !plan(place, there, inner);
@@ -476,12 +477,17 @@ void JointSolve::settle_ball(const Vec3& goal, ConstraintSolution& solution) noe
   constexpr double least_gain = 1e-5;
   double looked_at = infinity;
   constexpr int most_vain_leaps = 3;
+  // A tick that is cut short brings the ball nearer by as much: else two of them would be taken for a rest.
+  constexpr double worth_a_tick = 1e-2;
+  const double begun_at = (solution.proxy - goal).norm();
   BallMove move{.goal = goal, .room = longest_stride * radius_};
   int vain_leaps = 0;
   solution.planes.clear();
   touched(solution.proxy, solution.planes);
   bool stayed = false;
-  for (int i = 0; i < most_moves && !work_.spent(); ++i) {
+  for (int i = 0; i < most_moves; ++i) {
+    nearer_ = (solution.proxy - goal).norm() <= (1.0 - worth_a_tick) * begun_at;
+    if (may_end()) return;
     if (stayed) recall(solution.proxy, solution.planes);
     const bool there = !plan(solution.proxy, solution.planes, move);
     bool on = !there;

@@ -56,7 +56,7 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
       // In free space, or without friction, the proxy goes all the way; what it meets then decides.
       goal = probe;
       solution = solve(proxy, goal);
-      const bool met = planes.empty() && !solution.planes.empty() && round == 0 &&
+      const bool met = !was_cut(solution) && planes.empty() && !solution.planes.empty() && round == 0 &&
                        strongest_hold(solution.planes, probe, friction_of).friction.still > 0.0;
       if (!met) {
         sliding = false;
@@ -75,11 +75,16 @@ ConstraintSolution JointSolve::solve_with_friction(const Vec3& from, const Vec3&
       const HeldSet held = held_;
       double share = 1.0;
       slipped = false;
-      for (int part = 0; part < most_parts && !slipped && !work_.spent(); ++part, share *= 0.25) {
+      for (int part = 0; part < most_parts && !slipped && (leads_ball() || !work_.spent()); ++part, share *= 0.25) {
         goal = slip.goal(share);
         solution = solve(proxy, goal);
         slipped = no_farther(solution.proxy, proxy, probe);
         if (!slipped) held_ = held;
+      }
+      // What holds it is known where it comes to rest.
+      if (slipped && was_cut(solution)) {
+        sliding = true;
+        return solution;
       }
     }
     if (!slipped) {

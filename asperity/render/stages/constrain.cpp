@@ -274,7 +274,7 @@ bool constrain_on_face(Touched& touch, Tick& tick) noexcept {
 }
 
 /// Whether a proxy that is not at rest has anything left to do. `before`: where the tick found it.
-void see_what_is_left(Tick& tick, const Vec3& before) noexcept {
+void see_what_is_left(Tick& tick, const Vec3& before, bool budgeted) noexcept {
   // All that two ticks can do, for what no hand could tell, is as good as a rest. One may have flown in vain.
   constexpr double least_gain = 1e-4;
   ProxyState& state = tick.state;
@@ -286,7 +286,7 @@ void see_what_is_left(Tick& tick, const Vec3& before) noexcept {
   const bool idle = (state.proxy - position).norm() >= (1.0 - least_gain) * (before - position).norm();
   if (idle && state.idle) tick.converged = true;
   state.idle = idle;
-  tick.open = !tick.converged && tick.cache.work().spent();
+  tick.open = budgeted && !tick.converged && tick.cache.work().spent();
   tick.converged = tick.converged || tick.open;
 }
 
@@ -296,11 +296,13 @@ void constrain(Tick& tick) noexcept {
   Touched* last = nullptr;
   std::size_t count = 0;
   bool facets = false;
+  bool smooth = false;
   for (Touched& touch : tick.touches) {
     if (!touch.facts->constrains) continue;
     ++count;
     last = &touch;
     facets = facets || touch.facts->facets;
+    smooth = smooth || touch.facts->smooth;
   }
   if (count == 0) {
     tick.state.proxy = tick.felt = tick.probe->pose.position;
@@ -312,10 +314,12 @@ void constrain(Tick& tick) noexcept {
   const bool alone = count == 1 && point && !last->facts->by_planes &&
                      (last->facts->smooth || last->contact->surface.rests || last->contact->surface.places.size() <= 1);
   const Vec3 before = tick.state.proxy;
+  // A ball on triangles alone makes few moves, and what it looks at hangs on what is known of them.
+  const bool budgeted = tick.scene.probe_radius() == 0.0 || smooth;
   if (alone) tick.state.sliding = last->contact->surface.sliding;
   Place border;
   const bool on_mesh = count == 1 && tick.scene.probe_radius() > 0.0 && !last->facts->smooth && !facets;
-  if (on_mesh && constrain_on_face(*last, tick)) return see_what_is_left(tick, before);
+  if (on_mesh && constrain_on_face(*last, tick)) return see_what_is_left(tick, before, budgeted);
   if (!alone || !on_view(last->view, [&](const auto& view) { return constrain_on(view, *last, tick, border); })) {
     if (facets) {
       constrain_with_facets(tick);
@@ -323,7 +327,7 @@ void constrain(Tick& tick) noexcept {
       constrain_jointly(tick, nullptr, border);
     }
   }
-  see_what_is_left(tick, before);
+  see_what_is_left(tick, before, budgeted);
 }
 
 }  // namespace asperity

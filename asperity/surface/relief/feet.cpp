@@ -224,12 +224,14 @@ class ReliefFeetSearch {
     if (!known) {
       sample(frame, from_u, from_v, frame.prism.corner + middle, samples);
       enclose(part.disk, samples);
-      for (const bool along_u : {true, false}) samples.steep[along_u ? 0 : 1] = any_steep(frame, samples, along_u);
+      for (const bool along_u : {true, false}) mark_steep(frame, along_u, samples);
     }
     if (!within_reach(samples)) return;
     const Vec3f off = (from_corner_ - middle).cast<float>();
     SampleSquares squares;
     squares_from(samples, off, squares);
+    started_.clear();
+    if (squares.nearest < BlockSamples::nowhere) overlaps(std::sqrt(static_cast<double>(squares.nearest)));
     for (int i = 0; i < BlockSamples::across; ++i) {
       for (std::uint32_t least = squares.least[i]; least != 0; least &= least - 1) {
         const int j = std::countr_zero(least);
@@ -240,7 +242,7 @@ class ReliefFeetSearch {
     if (squares.nearest <= beside_touching) look_closely(frame, from_u, from_v, squares, beside_touching);
     if (narrowest_ >= few_steps * step_) return;
     for (const bool along_u : {true, false}) {
-      if (samples.steep[along_u ? 0 : 1]) look_between(frame, from_u, from_v, along_u, samples, off);
+      if (samples.any_steep[along_u ? 0 : 1]) look_between(frame, from_u, from_v, along_u, samples, off);
     }
   }
 
@@ -253,29 +255,26 @@ class ReliefFeetSearch {
     return least;
   }
 
-  /// Calls see(k, way, length) for the samples of a block that are far from the next one: `way` there, its length
-  /// squared.
-  template <class See>
-  void for_each_steep(const ReliefFrame& frame, const BlockSamples& samples, bool along_u,
-                      const See& see) const noexcept {
+  /// Of samples that are far from the next one, in a face that has walls, which they are.
+  void mark_steep(const ReliefFrame& frame, bool along_u, BlockSamples& samples) const noexcept {
     constexpr float more_than_level = 1.2F;  // of the squared distance
     const int ahead = along_u ? stride : 1;
     const Vec3& edge = along_u ? frame.prism.edge_u : frame.prism.edge_v;
     const float far = more_than_level * static_cast<float>(step_ * step_ * edge.squaredNorm());
-    for (int k = 0; k < stride * stride - ahead; ++k) {
-      if (!along_u && k % stride == stride - 1) continue;
-      const Vec3f way = sample_at(samples, k + ahead) - sample_at(samples, k);
-      const float length = way.squaredNorm();
-      if (length > far && length < BlockSamples::far_off) see(k, way, length);
+    auto& steep = samples.steep[along_u ? 0 : 1];
+    std::fill_n(steep, stride, 0U);
+    std::uint32_t any = 0;
+    if (narrowest_ < few_steps * step_) {
+      for (int i = 0; i < stride - (along_u ? 1 : 0); ++i) {
+        for (int j = 0; j < stride - (along_u ? 0 : 1); ++j) {
+          const int k = i * stride + j;
+          const float length = (sample_at(samples, k + ahead) - sample_at(samples, k)).squaredNorm();
+          if (length > far && length < BlockSamples::far_off) steep[i] |= 1U << static_cast<unsigned>(j);
+        }
+        any |= steep[i];
+      }
     }
-  }
-
-  /// Whether there is any, in a face that has walls.
-  [[nodiscard]] bool any_steep(const ReliefFrame& frame, const BlockSamples& samples, bool along_u) const noexcept {
-    bool any = false;
-    if (narrowest_ < few_steps * step_)
-      for_each_steep(frame, samples, along_u, [&](int, const Vec3f&, float) { any = true; });
-    return any;
+    samples.any_steep[along_u ? 0 : 1] = any != 0;
   }
 
   /// Descends from between samples that are far apart: where the maps of two faces meet at unlike heights, a wall
@@ -286,27 +285,39 @@ class ReliefFeetSearch {
     const int ahead = along_u ? stride : 1;
     const int beside = along_u ? 1 : stride;
     const Vec3& edge = along_u ? frame.prism.edge_u : frame.prism.edge_v;
+    constexpr std::uint32_t own = (1U << BlockSamples::across) - 1;
+    const auto& steep = samples.steep[along_u ? 0 : 1];
     float squares[BlockSamples::count];
     std::fill_n(squares, BlockSamples::count, BlockSamples::nowhere);
-    for_each_steep(frame, samples, along_u, [&](int k, const Vec3f& way, float length) {
-      const Vec3f to = p - sample_at(samples, k);
-      squares[k] = (to - std::clamp(to.dot(way) / length, 0.0F, 1.0F) * way).squaredNorm();
-    });
+    for (int i = 0; i < stride; ++i) {
+      for (std::uint32_t row = steep[i]; row != 0; row &= row - 1) {
+        const int k = i * stride + std::countr_zero(row);
+        const Vec3f way = sample_at(samples, k + ahead) - sample_at(samples, k);
+        const Vec3f to = p - sample_at(samples, k);
+        squares[k] = (to - std::clamp(to.dot(way) / way.squaredNorm(), 0.0F, 1.0F) * way).squaredNorm();
+      }
+    }
     for (int i = 0; i < BlockSamples::across; ++i) {
-      for (int j = 0; j < BlockSamples::across; ++j) {
+      for (std::uint32_t row = (steep[i + 1] >> 1U) & own; row != 0; row &= row - 1) {
+        const int j = std::countr_zero(row);
         const int k = (i + 1) * stride + j + 1;
         const float here = squares[k];
-        if (!(here < BlockSamples::nowhere) || here > squares[k - beside] || here >= squares[k + beside]) continue;
+        if (!first_of_like(&squares[k])) continue;
         const auto length = static_cast<double>((sample_at(samples, k + ahead) - sample_at(samples, k)).norm());
-        if (std::sqrt(static_cast<double>(here)) <= reach_ + of_chord * length)
-          sample_between(frame, {(from_u + i) * step_, (from_v + j) * step_}, along_u, length / (step_ * edge.norm()));
+        if (std::sqrt(static_cast<double>(here)) > reach_ + of_chord * length) continue;
+        const auto square = [&](int at) { return static_cast<double>(squares[at]); };
+        const double drop = std::max(least_drop_, 0.5 * rise(square(k), square(k - beside), square(k + beside)));
+        sample_between(frame, {(from_u + i) * step_, (from_v + j) * step_}, along_u, length / (step_ * edge.norm()),
+                       drop);
       }
     }
   }
 
   /// From a sample to the next one, `steepness` times as far as on the level, and descends from what is nearer than
-  /// what is beside it on the way.
-  void sample_between(const ReliefFrame& frame, const Vec2& from, bool along_u, double steepness) noexcept {
+  /// what is beside it on the way, and may be within reach. `drop`: by how much (m^2) a place beside the way may be
+  /// nearer.
+  void sample_between(const ReliefFrame& frame, const Vec2& from, bool along_u, double steepness,
+                      double drop) noexcept {
     constexpr int most = 64;
     const double wanted = 0.5 * few_steps * steepness * step_ / narrowest_;
     const int parts = std::clamp(static_cast<int>(std::ceil(wanted / lanes)) * static_cast<int>(lanes), 4, most);
@@ -317,7 +328,9 @@ class ReliefFeetSearch {
       return along_u ? Vec2(from.x() + share, from.y()) : Vec2(from.x(), from.y() + share);
     };
     const auto look = [&](int part, double next) {
-      if (part >= 0 && here < before && here <= next) descend_from({frame, at(part).x(), at(part).y()});
+      const bool may_be = part >= 0 && here < before && here <= next &&
+                          here - std::max(drop, 0.5 * rise(here, before, next)) <= reach_ * reach_;
+      if (may_be) descend_from({frame, at(part).x(), at(part).y()});
       before = here;
       here = next;
     };
@@ -332,7 +345,7 @@ class ReliefFeetSearch {
       }
       surface_.heights_alone(frame, u, v, *partners_, heights);
       for (std::size_t k = 0; k < lanes; ++k)
-        look(first + static_cast<int>(k) - 1, (frame.prism.point({u[k], v[k], heights[k]}) - p_).norm());
+        look(first + static_cast<int>(k) - 1, (frame.prism.point({u[k], v[k], heights[k]}) - p_).squaredNorm());
     }
     look(parts - 1, infinity);
     count_.evaluations += static_cast<std::uint32_t>(parts) / static_cast<std::uint32_t>(lanes);
@@ -379,9 +392,10 @@ class ReliefFeetSearch {
       const Beside crest = crest_beside(&squares.of[k]);
       const double u = std::clamp((from_u + i + static_cast<double>(crest.u)) * step_, 0.0, 1.0);
       const double v = std::clamp((from_v + j + static_cast<double>(crest.v)) * step_, 0.0, 1.0 - u);
-      const bool known = std::any_of(out_.begin(), out_.end(), [&](const Foot& foot) {
-        return foot.element == frame.face && std::hypot(foot.at[1] - u, foot.at[2] - v) <= same_place * step_;
-      });
+      const bool known =
+          started_at(u, v) || std::any_of(out_.begin(), out_.end(), [&](const Foot& foot) {
+            return foot.element == frame.face && std::hypot(foot.at[1] - u, foot.at[2] - v) <= same_place * step_;
+          });
       if (!known) descend_from({frame, u, v});
     });
   }
@@ -415,8 +429,10 @@ class ReliefFeetSearch {
   /// Descends from a sample, where those around it are no nearer, if it may lead to something new within reach.
   void start_from(const ReliefFrame& frame, int i, int j, const float* here) noexcept {
     if (!first_of_like(here) || !(*here < BlockSamples::nowhere)) return;
-    const double drop =
-        std::max(least_drop_, 0.5 * (rise(*here, here[-stride], here[stride]) + rise(*here, here[-1], here[1])));
+    const auto rise_of = [&](int ahead) {
+      return rise(static_cast<double>(*here), static_cast<double>(here[-ahead]), static_cast<double>(here[ahead]));
+    };
+    const double drop = std::max(least_drop_, 0.5 * (rise_of(stride) + rise_of(1)));
     const double u = i * step_;
     const double v = std::min(j * step_, 1.0 - u);
     if (static_cast<double>(*here) - drop > reach_ * reach_ || found_beside(frame.face, u, v)) return;
@@ -438,11 +454,12 @@ class ReliefFeetSearch {
   }
 
   /// How much farther the neighbours on both sides are at most, of those that there are.
-  static double rise(float here, float before, float after) noexcept {
-    float most = 0.0F;
-    if (before < BlockSamples::nowhere) most = before - here;
-    if (after < BlockSamples::nowhere) most = std::max(most, after - here);
-    return static_cast<double>(most);
+  static double rise(double here, double before, double after) noexcept {
+    constexpr double nowhere = static_cast<double>(BlockSamples::nowhere);
+    double most = 0.0;
+    if (before < nowhere) most = before - here;
+    if (after < nowhere) most = std::max(most, after - here);
+    return most;
   }
 
   /// The surface at a block's samples and at those around it.
@@ -478,7 +495,16 @@ class ReliefFeetSearch {
     });
   }
 
+  /// Whether a descent has begun there already, among the block's samples.
+  [[nodiscard]] bool started_at(double u, double v) const noexcept {
+    const double same = 1e-3 * step_;
+    return std::any_of(started_.begin(), started_.end(), [&](const Vec2& from) {
+      return std::abs(from.x() - u) <= same && std::abs(from.y() - v) <= same;
+    });
+  }
+
   void descend_from(const ReliefPlace& place) noexcept {
+    started_.push_back({place.u, place.v});
     ReliefPlace at = place;
     ReliefPoint spot = surface_.point(at.frame, at.u, at.v);
     const Vec3 start = spot.point;
@@ -508,12 +534,16 @@ class ReliefFeetSearch {
       if (foot.distance < farthest->distance) *farthest = foot;
     }
     if (out_.size() == asked_.most) reach_ = farthest_found()->distance;
-    if (asked_.of_overlap < 1.0 && foot.distance < asked_.touching) {
-      const double among =
-          std::max(asked_.of_overlap * (asked_.touching - foot.distance), asked_.reach - asked_.touching);
-      reach_ = std::min(reach_, foot.distance + among);
-    }
+    overlaps(foot.distance);
   }
+
+  /// Something of the surface is so far away (m): much further off nothing is looked for where that is overlapped.
+  void overlaps(double distance) noexcept {
+    if (!(asked_.of_overlap < 1.0) || !(distance < asked_.touching)) return;
+    const double among = std::max(asked_.of_overlap * (asked_.touching - distance), asked_.reach - asked_.touching);
+    reach_ = std::min(reach_, distance + among);
+  }
+
   [[nodiscard]] Foot* farthest_found() noexcept {
     return std::max_element(out_.begin(), out_.end(),
                             [](const Foot& a, const Foot& b) { return a.distance < b.distance; });
@@ -535,6 +565,7 @@ class ReliefFeetSearch {
   BlockSamples samples_;
   std::optional<ReliefPartners> own_partners_;
   ReliefPartners* partners_;
+  FixedVector<Vec2, 16> started_;    ///< descents from the samples of the block that is looked at (barycentric)
   Vec3 from_corner_ = Vec3::Zero();  ///< of the face to where places are looked for (m)
   double step_ = 1.0;                ///< of the face's lattice (barycentric)
   int last_ = 1;                     ///< sample along an edge

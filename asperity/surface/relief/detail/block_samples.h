@@ -78,7 +78,10 @@ struct BlockSamples {
   float z[count];
   ReliefDisk around;  ///< them alone
   float apart;        ///< how far they are from those beside them at most (m)
-  bool steep[2];      ///< along u and v: whether some are so far from the next that a wall may stand between
+  /// Of each row those that are so far from the next, along u and along v, that a wall may stand between: bit j of the
+  /// j-th, of those right beside the part as well.
+  std::uint32_t steep[2][stride];
+  bool any_steep[2];
 };
 
 /// Samples (m, off `middle`) at four places of a face's shell, one after the other from `at` on. [servo]
