@@ -1,5 +1,6 @@
 // T1, T2, T5 and T7 (formulation D8) for a probe with a radius, on every kind of surface that leads one.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -254,14 +255,14 @@ std::vector<Body> bodies() {
   return made;
 }
 
-/// Of one body, fast and slowly, through and around it. `most_open`: ticks in a row at which it is not at rest, where a
+/// Of one body, fast and slowly, through and around it. `longest`: ticks in a row at which it was not at rest, where a
 /// stride is at most 2 mm.
-void lead_at_any_speed(const Body& body, double radius, double friction, std::optional<std::uint32_t> budget,
-                       int most_open, Rng& rng) {
+void lead_at_any_speed(const Body& body, double radius, double friction, std::optional<std::uint32_t> budget, Rng& rng,
+                       int& longest) {
   const Box box = body.surface->bounds().grown(4e-3);
   Scene scene = scene_of(body.surface, radius, friction, budget);
   int pressed = 0;
-  int longest = 0;
+  longest = 0;
   for (int run = 0; run < 20; ++run) {
     int open = 0;
     Ball ball(scene);
@@ -289,7 +290,6 @@ void lead_at_any_speed(const Body& body, double radius, double friction, std::op
     }
   }
   EXPECT_GT(pressed, 100) << body.name << ", " << radius;
-  EXPECT_LE(longest, most_open) << body.name << ", " << radius << ", friction " << friction;
 }
 
 TEST(T5_pop_through, a_ball_is_never_nearer_than_its_radius_at_any_speed) {
@@ -297,11 +297,16 @@ TEST(T5_pop_through, a_ball_is_never_nearer_than_its_radius_at_any_speed) {
   for (const Body& body : bodies()) {
     for (const double radius : radii) {
       for (const double friction : {0.0, 0.4}) {
-        // Faster than 2 m/s it may be led around half of the body in one tick. With next to no budget it is behind
-        // wherever it goes.
-        lead_at_any_speed(body, radius, friction, 0U, 0, rng);
-        lead_at_any_speed(body, radius, friction, {}, 5, rng);
-        lead_at_any_speed(body, radius, friction, SceneSettings::least_budget, 60, rng);
+        SCOPED_TRACE(fmt::format("{}, {}, friction {}", body.name, radius, friction));
+        int open = 0;
+        // Faster than 2 m/s it may be led around half of the body in one tick.
+        lead_at_any_speed(body, radius, friction, 0U, rng, open);
+        EXPECT_EQ(open, 0);
+        lead_at_any_speed(body, radius, friction, {}, rng, open);
+        EXPECT_LE(open, 5);
+        // With next to no budget it is behind wherever it goes.
+        lead_at_any_speed(body, radius, friction, SceneSettings::least_budget, rng, open);
+        EXPECT_GT(open, 5);
       }
     }
   }

@@ -171,8 +171,8 @@ class JointSolve {
     constexpr double most_gaps = 100.0;
     return off <= most_gaps * (margin() + widest_skin_) + tolerance_;
   }
-  /// Whether the budget is spent. A ball, of which one look may take all of it, comes nearer first. [servo]
-  [[nodiscard]] bool may_end() const noexcept { return work_.spent() && (nearer_ || !leads_ball()); }
+  /// Whether a ball has spent the budget. One look may take all of it: it comes nearer first. [servo]
+  [[nodiscard]] bool may_end() const noexcept { return work_.spent() && nearer_; }
   /// Whether a ball was still on its way there. [servo]
   [[nodiscard]] bool was_cut(const ConstraintSolution& solution) const noexcept {
     return leads_ball() && !solution.converged && work_.spent();

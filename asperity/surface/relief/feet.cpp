@@ -242,7 +242,9 @@ class ReliefFeetSearch {
     if (squares.nearest <= beside_touching) look_closely(frame, from_u, from_v, squares, beside_touching);
     if (narrowest_ >= few_steps * step_) return;
     for (const bool along_u : {true, false}) {
-      if (samples.any_steep[along_u ? 0 : 1]) look_between(frame, from_u, from_v, along_u, samples, off);
+      const auto& steep = samples.steep[along_u ? 0 : 1];
+      if (std::any_of(steep, steep + stride, [](std::uint32_t row) { return row != 0; }))
+        look_between(frame, from_u, from_v, along_u, samples, off);
     }
   }
 
@@ -263,18 +265,14 @@ class ReliefFeetSearch {
     const float far = more_than_level * static_cast<float>(step_ * step_ * edge.squaredNorm());
     auto& steep = samples.steep[along_u ? 0 : 1];
     std::fill_n(steep, stride, 0U);
-    std::uint32_t any = 0;
-    if (narrowest_ < few_steps * step_) {
-      for (int i = 0; i < stride - (along_u ? 1 : 0); ++i) {
-        for (int j = 0; j < stride - (along_u ? 0 : 1); ++j) {
-          const int k = i * stride + j;
-          const float length = (sample_at(samples, k + ahead) - sample_at(samples, k)).squaredNorm();
-          if (length > far && length < BlockSamples::far_off) steep[i] |= 1U << static_cast<unsigned>(j);
-        }
-        any |= steep[i];
+    if (narrowest_ >= few_steps * step_) return;
+    for (int i = 0; i < stride - (along_u ? 1 : 0); ++i) {
+      for (int j = 0; j < stride - (along_u ? 0 : 1); ++j) {
+        const int k = i * stride + j;
+        const float length = (sample_at(samples, k + ahead) - sample_at(samples, k)).squaredNorm();
+        if (length > far && length < BlockSamples::far_off) steep[i] |= 1U << static_cast<unsigned>(j);
       }
     }
-    samples.any_steep[along_u ? 0 : 1] = any != 0;
   }
 
   /// Descends from between samples that are far apart: where the maps of two faces meet at unlike heights, a wall

@@ -81,7 +81,6 @@ struct BlockSamples {
   /// Of each row those that are so far from the next, along u and along v, that a wall may stand between: bit j of the
   /// j-th, of those right beside the part as well.
   std::uint32_t steep[2][stride];
-  bool any_steep[2];
 };
 
 /// Samples (m, off `middle`) at four places of a face's shell, one after the other from `at` on. [servo]
