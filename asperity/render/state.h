@@ -13,6 +13,7 @@
 #include "asperity/render/energy/account.h"
 #include "asperity/render/law.h"
 #include "asperity/render/view.h"
+#include "asperity/surface/iso/kept_cells.h"
 #include "asperity/surface/relief/blocks.h"
 #include "asperity/surface/view.h"
 
@@ -113,8 +114,8 @@ static_assert(sizeof(ProxyState) <= 5120);
 class ProxyCache {
  public:
   ProxyCache() = default;
-  /// With room for what a ball looks at on reliefs, where the scene has a ball and such: without it each of its ticks
-  /// looks at all of that anew. [build]
+  /// With room for what a ball looks at on reliefs and isosurfaces, where the scene has a ball and such: without it
+  /// each of its ticks looks at all of that anew. [build]
   explicit ProxyCache(const Scene& scene);
 
   /// That of an instance, or the one that was not asked for longest. [servo]
@@ -140,19 +141,22 @@ class ProxyCache {
     std::uint64_t used = 0;
     SurfaceCache cache;
     std::unique_ptr<ReliefBlocks> blocks;
+    std::unique_ptr<KeptCells> cells;
 
     Entry() = default;
     Entry(const Entry& other)
         : instance(other.instance),
           used(other.used),
           cache(other.cache),
-          blocks(other.blocks ? std::make_unique<ReliefBlocks>(*other.blocks) : nullptr) {}
+          blocks(other.blocks ? std::make_unique<ReliefBlocks>(*other.blocks) : nullptr),
+          cells(other.cells ? std::make_unique<KeptCells>(*other.cells) : nullptr) {}
     Entry(Entry&&) noexcept = default;
     Entry& operator=(Entry&&) noexcept = default;
     ~Entry() = default;
     SurfaceCache& told(WorkMeter& work) noexcept {
       cache.work = &work;
       cache.blocks = blocks.get();
+      cache.cells.kept = cells.get();
       return cache;
     }
   };

@@ -36,11 +36,15 @@ class VolumeReading {
 
 ProxyCache::ProxyCache(const Scene& scene) {
   const auto& instances = scene.instances();
-  const auto is_relief = [](const Instance& instance) { return relief_of(instance) != nullptr; };
-  if (!(scene.probe_radius() > 0.0) || std::none_of(instances.begin(), instances.end(), is_relief)) return;
+  if (!(scene.probe_radius() > 0.0)) return;
+  const auto any = [&](const auto& is) { return std::any_of(instances.begin(), instances.end(), is); };
+  const bool reliefs = any([](const Instance& instance) { return relief_of(instance) != nullptr; });
+  const bool isosurfaces = any([](const Instance& instance) { return iso_of(instance.surface) != nullptr; });
   // Any of them may come to be any instance's.
-  for (std::size_t i = 0; i < std::min(instances.size(), entries_.size()); ++i)
-    entries_[i].blocks = std::make_unique<ReliefBlocks>();
+  for (std::size_t i = 0; i < std::min(instances.size(), entries_.size()); ++i) {
+    if (reliefs) entries_[i].blocks = std::make_unique<ReliefBlocks>();
+    if (isosurfaces) entries_[i].cells = std::make_unique<KeptCells>();
+  }
 }
 
 ForceSample step(const Scene& scene, ProxyState& state, ProxyCache& cache, const ProbeSample& probe,

@@ -15,13 +15,15 @@
 
 namespace asperity {
 
+class KeptCells;
 class ReliefBlocks;
 
-/// The last two cells of a field that were read.
+/// The last two cells of a field that were read, and those around balls.
 struct CellCache {
   CellPolynomial cell;
   CellPolynomial other;
-  bool other_last = false;  ///< `other` was used after `cell`
+  bool other_last = false;    ///< `other` was used after `cell`
+  KeptCells* kept = nullptr;  ///< of what balls look at, in the caller's hands; none: nothing is kept
   /// The one of the two that holds a cell, or else the one that was not used last. [servo]
   CellPolynomial& slot(std::uint64_t owner, int level, const CellIndex& index) noexcept {
     const auto holds = [&](const CellPolynomial& c) { return c.owner == owner && c.level == level && c.cell == index; };
@@ -81,6 +83,7 @@ struct Goal {
   bool may_leave = true;      ///< false: stays on the surface whatever the goal (closest points)
   Sides sides = Sides::both;  ///< that can be in the way
   bool exactly = false;       ///< goes on until rounding alone is left, of reliefs
+  bool any_sheet = false;     ///< may pass from one sheet to another, of isosurfaces: a place is all that is asked for
   int moves = 1024;           ///< places that it may look at
   double flattest = usually_flattest;  ///< from which share of its metric's curvature on Newton's step is trusted
   /// The same of evaluations, where a place may take several of them.

@@ -345,36 +345,6 @@ TEST(IsoSurface, AScheduleRunsEvenlyFromStepToStep) {
   refused({{Seconds(1.0), std::nan("")}}, "schedule[0].threshold");
 }
 
-// A surface may bulge within one cell, towards a place from where no way to the cell's corners meets it.
-TEST_P(IsoEach, TheNearestPlaceIsAsNearAsWhatRaysMeet) {
-  std::normal_distribution<double> normal;
-  int seen = 0;
-  int missed = 0;
-  for (std::uint64_t seed = 0; seed < 4; ++seed) {
-    const auto field = random_field(14, GetParam(), seed, 0.4);
-    const IsoSurface surface = IsoSurface::build(field, 0.35, Inside::high).value();
-    SurfaceCache cache;
-    const IsoView view = surface.view(cache);
-    std::mt19937_64 generator(seed + 100);
-    for (int i = 0; i < 200; ++i) {
-      const Vec3 p = random_point(generator, 0.045);
-      double nearest = 0.02;
-      const Foot foot = view.nearest(p, nearest);
-      for (int ray = 0; ray < 1500; ++ray) {
-        const Vec3 way = Vec3(normal(generator), normal(generator), normal(generator)).normalized();
-        const IsoCrossing crossing = view.first_crossing({p, p + nearest * way});
-        if (crossing.found) nearest *= crossing.t;
-      }
-      if (!(nearest < 0.02)) continue;
-      ++seen;
-      missed += foot.found() && foot.distance <= (1.0 + 1e-9) * nearest ? 0 : 1;
-    }
-  }
-  EXPECT_GT(seen, 700);
-  // What bulges within an eighth of a cell may be.
-  EXPECT_LE(missed, seen / 700);
-}
-
 TEST(IsoSurface, BallStopsAtItsRadius) {
   const IsoSurface surface = IsoSurface::build(sphere_field(65), 0.03, Inside::low).value();
   std::mt19937_64 generator(12);

@@ -231,6 +231,72 @@ ASPERITY_INLINE void samples_to_bernstein(const std::array<HermiteWeights, 3>& w
   for (int j = 0; j < 4; ++j) mix_rows(weights[2], 4, rows + j);
 }
 
+ASPERITY_INLINE void halve_rows(const Row* from, int stride, Row* first, Row* second) noexcept {
+  const FourLanes left = 0.5 * (from[0] + from[stride]);
+  const FourLanes middle = 0.5 * (from[stride] + from[2 * stride]);
+  const FourLanes right = 0.5 * (from[2 * stride] + from[3 * stride]);
+  const FourLanes before = 0.5 * (left + middle);
+  const FourLanes after = 0.5 * (middle + right);
+  const FourLanes at = 0.5 * (before + after);
+  first[0] = from[0];
+  first[stride] = left;
+  first[2 * stride] = before;
+  first[3 * stride] = at;
+  second[0] = at;
+  second[stride] = after;
+  second[2 * stride] = right;
+  second[3 * stride] = from[3 * stride];
+}
+
+ASPERITY_INLINE void halve_along(const double* whole, int axis, double* first, double* second) noexcept {
+  const auto* from = reinterpret_cast<const Row*>(whole);
+  auto* low = reinterpret_cast<Row*>(first);
+  auto* high = reinterpret_cast<Row*>(second);
+  if (axis == 0) {
+#pragma GCC unroll 4
+    for (int r = 0; r < 16; ++r) {
+      const FourLanes c = from[r];
+      const FourLanes once = 0.5 * (c + __builtin_shuffle(c, Pick{1, 2, 3, 3}));
+      const FourLanes twice = 0.5 * (once + __builtin_shuffle(once, Pick{1, 2, 3, 3}));
+      const FourLanes thrice = 0.5 * (twice + __builtin_shuffle(twice, Pick{1, 2, 3, 3}));
+      // c0, once 0, twice 0, thrice 0; and thrice 0, twice 1, once 2, c3.
+      low[r] = __builtin_shuffle(__builtin_shuffle(c, once, Pick{0, 4, 0, 0}),
+                                 __builtin_shuffle(twice, thrice, Pick{0, 4, 0, 0}), Pick{0, 1, 4, 5});
+      high[r] = __builtin_shuffle(__builtin_shuffle(thrice, twice, Pick{0, 5, 0, 0}),
+                                  __builtin_shuffle(once, c, Pick{2, 7, 0, 0}), Pick{0, 1, 4, 5});
+    }
+    return;
+  }
+#pragma GCC unroll 4
+  for (int i = 0; i < 4; ++i) {
+    const int at = axis == 1 ? 4 * i : i;
+    halve_rows(from + at, axis == 1 ? 1 : 4, low + at, high + at);
+  }
+}
+
+ASPERITY_INLINE LeastCoefficients least_of(const double* coefficients, const double (&along)[3][4]) noexcept {
+  const auto* row = reinterpret_cast<const Row*>(coefficients);
+  FourLanes least = row[0];
+  FourLanes with = FourLanes{} + infinity;
+#pragma GCC unroll 4
+  for (int k = 0; k < 4; ++k) {
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; ++j) {
+      const FourLanes here = row[4 * k + j];
+      const FourLanes sum = here + (along[1][j] + along[2][k]);
+      least = here < least ? here : least;
+      with = sum < with ? sum : with;
+    }
+  }
+  with += *reinterpret_cast<const Row*>(along[0]);
+  LeastCoefficients out;
+  for (std::size_t l = 0; l < lanes; ++l) {
+    out.alone = least[l] < out.alone ? least[l] : out.alone;
+    out.with_sums = with[l] < out.with_sums ? with[l] : out.with_sums;
+  }
+  return out;
+}
+
 // The names of both forms of each.
 #define ASPERITY_CUBIC_KERNELS(suffix, target)                                                                    \
   target double value##suffix(const CellPolynomial& cell, const Vec3& p) noexcept {                               \
@@ -252,6 +318,12 @@ ASPERITY_INLINE void samples_to_bernstein(const std::array<HermiteWeights, 3>& w
   }                                                                                                               \
   target void to_bernstein##suffix(const std::array<HermiteWeights, 3>& weights, double* coefficients) noexcept { \
     samples_to_bernstein(weights, coefficients);                                                                  \
+  }                                                                                                               \
+  target void halve##suffix(const double* whole, int axis, double* first, double* second) noexcept {              \
+    halve_along(whole, axis, first, second);                                                                      \
+  }                                                                                                               \
+  target LeastCoefficients least##suffix(const double* coefficients, const double(&along)[3][4]) noexcept {       \
+    return least_of(coefficients, along);                                                                         \
   }
 
 ASPERITY_CUBIC_KERNELS(_plain, )
@@ -262,7 +334,7 @@ ASPERITY_CUBIC_KERNELS(_wide, [[gnu::target("avx2,fma")]])
 CubicKernels chosen() noexcept {
 #ifdef ASPERITY_WIDE
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-    return {value_wide, values_wide, gradient_wide, jet_wide, ranges_wide, to_bernstein_wide};
+    return {value_wide, values_wide, gradient_wide, jet_wide, ranges_wide, to_bernstein_wide, halve_wide, least_wide};
 #endif
   return plain_cubic_kernels();
 }
@@ -270,7 +342,8 @@ CubicKernels chosen() noexcept {
 }  // namespace
 
 CubicKernels plain_cubic_kernels() noexcept {
-  return {value_plain, values_plain, gradient_plain, jet_plain, ranges_plain, to_bernstein_plain};
+  return {value_plain,  values_plain,       gradient_plain, jet_plain,
+          ranges_plain, to_bernstein_plain, halve_plain,    least_plain};
 }
 
 const CubicKernels cubic_kernels = chosen();

@@ -23,6 +23,12 @@ struct HermiteWeights {
   double second[4];
 };
 
+/// Bounds on a polynomial from below.
+struct LeastCoefficients {
+  double alone = infinity;
+  double with_sums = infinity;
+};
+
 /// How cubic cells are made and evaluated on this processor. [servo]
 struct CubicKernels {
   double (*value)(const CellPolynomial&, const Vec3&) noexcept;
@@ -33,6 +39,10 @@ struct CubicKernels {
   void (*ranges)(const double* coefficients, CellRanges&) noexcept;
   /// 4 x 4 x 4 samples to coefficients, in place; the weights along each axis.
   void (*to_bernstein)(const std::array<HermiteWeights, 3>&, double* coefficients) noexcept;
+  /// Coefficients over the two halves along an axis, by de Casteljau.
+  void (*halve)(const double* whole, int axis, double* first, double* second) noexcept;
+  /// The least of them; `along` three axes added to each: the least of these sums.
+  LeastCoefficients (*least)(const double* coefficients, const double (&along)[3][4]) noexcept;
 };
 extern const CubicKernels cubic_kernels;
 /// Those for every processor: what the others are tested against. [any]

@@ -65,6 +65,15 @@ Foot refined(const View& view, const Foot& foot, const Vec3& local) noexcept {
   return foot;
 }
 
+template <SurfaceView View>
+Foot nearest_exactly(const View& view, const Vec3& p, double bound, const Place& start) noexcept {
+  if constexpr (requires { view.nearest_exactly(p, bound, start); }) {
+    return view.nearest_exactly(p, bound, start);
+  } else {
+    return view.nearest(p, bound, start);
+  }
+}
+
 }  // namespace
 
 bool JointSolve::knows_feet(const Entry& entry) const noexcept {
@@ -155,7 +164,7 @@ const PlaneSet& JointSolve::feet_planes(std::size_t index, const Vec3& position)
                  feet);
   } else {
     const Foot foot = on_smooth_view(entry.touch->view, [&](const auto& view) {
-      return refined(view, view.nearest(local, touching + beyond, entry.near), local);
+      return nearest_exactly(view, local, touching + beyond, entry.near);
     });
     if (foot.found()) feet.push_back(foot);
   }
@@ -281,8 +290,8 @@ double JointSolve::free_around(const Vec3& position, double far) noexcept {
     // Mostly nothing is that near, and a bound tells so that is looked up.
     const auto* const relief = std::get_if<ReliefView>(&entry.touch->view);
     if (relief != nullptr && relief->room_around(local, free + around) >= free + around) continue;
-    const Foot foot = on_smooth_view(entry.touch->view,
-                                     [&](const auto& view) { return view.nearest(local, free + around, entry.near); });
+    const Foot foot = on_smooth_view(
+        entry.touch->view, [&](const auto& view) { return nearest_exactly(view, local, free + around, entry.near); });
     if (foot.found()) free = std::max(0.0, std::min(free, foot.distance - around));
   }
   return free;

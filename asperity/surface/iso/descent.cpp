@@ -296,7 +296,7 @@ class Leader {
       // Onto a border that it is all but on, it may; to and fro between borders, it comes nearer by rounding alone.
       const bool hardly = (y - x_).squaredNorm() <= least_way_;
       if (hardly && hardly_ == most_hardly) continue;
-      if (!same_sheet(*cell, pull, y)) {
+      if (!goal_.any_sheet && !same_sheet(*cell, pull, y)) {
         cell = load(pull.cell);
         continue;
       }

@@ -73,12 +73,22 @@ struct IsoView {
   /// The first crossing of a kind: into the inside from `front`, either way from `both`. The normal is zero where the
   /// field has no slope.
   [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
-  /// Cells in order of distance, in each the point led downhill by Newton's method.
+  /// Cells in order of distance, dismissed by bounds of the field over them and their parts; what is left leads
+  /// downhill by Newton's method. What bulges within an eighth of a cell and is nearer by less than that lets corners
+  /// tell may be missed.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
+  /// The same to rounding where the foot lies within one cell, as balls need it: see refined(). What it took and found
+  /// is kept, where there is room for it.
+  [[nodiscard]] Foot nearest_exactly(const Vec3& p, double bound, const Place& start = {}) const noexcept;
   /// A foot of `p` as exactly as the cell's polynomial tells it, where it lies within one cell: as far as a walk leaves
   /// it, where the surface is bent about as much as a ball around p is round, the direction to it is not known to what
   /// a ball at rest takes.
   [[nodiscard]] Foot refined(const Foot& foot, const Vec3& p) const noexcept;
+  /// By Newton's method within one cell, from `foot` on and no more than a share of the cell from it: whether it comes
+  /// to rest there. `room`: the least curvature of half the squared distance along the surface there; 1 where it is
+  /// flat, 0 where it is bent as a ball around p is.
+  bool settle(Foot& foot, const Vec3& p, double farthest, double* room = nullptr) const noexcept;
+  static constexpr double left_by_walks = 0.05;  ///< of a cell: how far off a foot a walk may end
   [[nodiscard]] IsoSpot at(const Place& place, const Vec3& normal) const noexcept {
     return {place.at, normal, place.side() * normal};
   }
