@@ -38,14 +38,14 @@ class KeptCells {
     Vec3 p = Vec3::Zero();
     bool operator==(const Asked&) const = default;
   };
-  /// To a search within a bound, from a place or from none. `last_pass`: what it takes from the foot that was found,
-  /// where that settled.
+  /// To a search within a bound, from a place or from none. `from_start`: how far the foot is that Newton's method
+  /// alone led to from there; `last_pass`: what it takes from the foot that was found, where that settled.
   struct Answer {
     Asked asked;
     double bound = 0.0;
     bool started = false;
     Vec3 start = Vec3::Zero();
-    bool settled_at_start = false;
+    double from_start = infinity;
     Foot foot;
     bool settled = false;
     WorkCount work;

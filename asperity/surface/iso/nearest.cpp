@@ -72,8 +72,13 @@ class NearestSearch {
   }
 
   Foot run() noexcept {
-    settled_at_start_ = start_.known() && settle(start_.at);
-    if (start_.known() && !settled_at_start_) lead(start_.at);
+    if (start_.known()) {
+      if (!go_to(start_.at)) {
+        lead(start_.at);
+      } else if (foot_.found()) {
+        from_start_ = best_;
+      }
+    }
     // Downhill from the point itself: near a smooth surface that is all.
     if (feet_ == Feet::as_walked || (!foot_.found() && best_ == infinity))
       lead(p_.cwiseMax(field_.bounds().lower).cwiseMin(field_.bounds().upper));
@@ -85,14 +90,14 @@ class NearestSearch {
       visit(octree_.root());
       return found_nearer_;
     };
-    while (pass() && feet_ == Feet::exact) continue;
+    for (int i = 0; pass() && feet_ == Feet::exact && i < most_passes; ++i) continue;
     tell(surface_.work, work_);
     return foot_;
   }
-  /// Whether Newton's method alone led from the start to a foot: no bound beyond that changes anything.
-  [[nodiscard]] bool settled_at_start() const noexcept { return settled_at_start_; }
-  /// Whether it ends so: what a search that begins with this foot takes is its last pass.
-  [[nodiscard]] bool is_settled() const noexcept { return foot_room_ > 0.0; }
+  /// How far the foot is that Newton's method alone led to from the start: no bound beyond that changes anything.
+  [[nodiscard]] double from_start() const noexcept { return from_start_; }
+  /// Whether it ends with such a foot: what a search that begins with it takes is the last pass.
+  [[nodiscard]] bool is_settled() const noexcept { return settled_ && !found_nearer_; }
   [[nodiscard]] WorkCount last_pass() const noexcept {
     return {work_.evaluations - last_pass_.evaluations, 0, work_.frames - last_pass_.frames};
   }
@@ -109,6 +114,7 @@ class NearestSearch {
   static constexpr int finest_part = 9;
   static constexpr int finer = 6;  ///< and so often more where Newton's method does not come to rest
   static constexpr int most_halvings = 30;
+  static constexpr int most_passes = 16;
   static constexpr double finest_of_distance = 0.5;
 
   [[nodiscard]] double distance_to(const std::uint32_t first[3], const std::uint32_t last[3]) const noexcept {
@@ -251,7 +257,8 @@ class NearestSearch {
     const bool fine = halvings >= finest_part && size <= finest_of_distance * best_;
     const Vec3 middle = 0.5 * (part.low + part.high);
     if (fine && (tells_all_within(looked.cell, middle, size) || go_to(middle))) return;
-    if (halvings >= most_halvings || (fine && (looked.cell.degree == 1 || halvings >= finest_part + finer))) {
+    const bool by_walks = feet_ == Feet::as_walked || looked.cell.degree == 1;
+    if (halvings >= most_halvings || (fine && (by_walks || halvings >= finest_part + finer))) {
       lead(middle);
       return;
     }
@@ -271,21 +278,12 @@ class NearestSearch {
     return cell.degree == 3 || cell.has_well_inside(foot_.point);
   }
 
-  /// By Newton's method within a cell. Whether it comes to rest there.
+  /// By Newton's method within a cell, where feet are told exactly. Whether it comes to rest there.
   bool go_to(const Vec3& x) noexcept {
     Foot foot{x, Vec3::Zero(), infinity, no_index, x};
     double room = 0.0;
     if (feet_ == Feet::as_walked || !surface_.settle(foot, p_, 1.0, &room)) return false;
-    if (foot.distance < (1.0 - no_nearer) * best_) take(foot.point, room);
-    return true;
-  }
-
-  /// By Newton's method alone, where feet are told exactly and it stays within the cell of `x`.
-  bool settle(const Vec3& x) noexcept {
-    Foot foot{x, Vec3::Zero(), infinity, no_index, x};
-    double room = 0.0;
-    if (feet_ != Feet::exact || !surface_.settle(foot, p_, 1.0, &room) || foot.distance >= best_) return false;
-    take(foot.point, room);
+    offer(foot.point, room, true);
     return true;
   }
 
@@ -316,19 +314,25 @@ class NearestSearch {
     counted.work = &walk;
     counted.descend(place, spot, {.point = p_, .may_leave = false, .any_sheet = feet_ == Feet::exact});
     work_ += walk.done();
-    Foot foot{spot.point, Vec3::Zero(), (spot.point - p_).norm(), no_index, spot.point};
+    Foot foot{spot.point, Vec3::Zero(), infinity, no_index, spot.point};
     double room = 0.0;
-    if (feet_ == Feet::exact) surface_.settle(foot, p_, IsoView::left_by_walks, &room);
-    if (foot.distance < best_) take(foot.point, room);
+    const bool settled = surface_.settle(foot, p_, IsoView::left_by_walks, &room);
+    if (feet_ == Feet::exact) {
+      offer(foot.point, room, settled);
+    } else {
+      offer(spot.point, room, false);
+    }
   }
 
-  /// `room`: as settle() tells, or 0.
-  void take(const Vec3& point, double room) noexcept {
-    foot_room_ = room;
+  /// What may be the nearest place. `room`: as IsoView::settle tells, or 0.
+  void offer(const Vec3& point, double room, bool settled) noexcept {
+    const double distance = (point - p_).norm();
+    if (!(distance < (foot_.found() ? 1.0 - no_nearer : 1.0) * best_)) return;
     found_nearer_ = true;
-    best_ = (point - p_).norm();
+    settled_ = settled;
+    foot_room_ = room;
+    best_ = foot_.distance = distance;
     foot_.point = foot_.at = point;
-    foot_.distance = best_;
     const Vec3 outward = surface_.outward(point);
     foot_.normal = (p_ - point).dot(outward) >= 0.0 ? outward : Vec3(-outward);
     foot_.element = surface_.element_at(point);
@@ -345,7 +349,8 @@ class NearestSearch {
   Feet feet_;
   Foot foot_;
   double foot_room_ = 0.0;
-  bool settled_at_start_ = false;
+  bool settled_ = false;
+  double from_start_ = infinity;
   bool found_nearer_ = false;  ///< in this pass
   WorkCount work_;
   WorkCount last_pass_;     ///< what it had taken before that
@@ -367,10 +372,9 @@ Foot IsoView::nearest_exactly(const Vec3& p, double bound, const Place& start) c
     const KeptCells::Answer& answer = kept->answer(before);
     if (!(answer.asked == asked)) continue;
     const auto begins_at = [&](const Vec3& at) { return start.known() && start.at == at; };
-    // Where Newton's method alone leads to a foot, no bound beyond it changes anything.
     const bool reached = answer.foot.found() && answer.foot.distance < bound;
-    const bool any_bound = (answer.settled_at_start && reached) || answer.bound == bound;
-    const bool as_then = any_bound && (answer.started ? begins_at(answer.start) : !start.known());
+    const bool as_then = (answer.from_start < bound || answer.bound == bound) &&
+                         (answer.started ? begins_at(answer.start) : !start.known());
     const bool from_it = answer.settled && reached && begins_at(answer.foot.at);
     if (!as_then && !from_it) continue;
     tell(work, as_then ? answer.work : answer.last_pass);
@@ -378,8 +382,8 @@ Foot IsoView::nearest_exactly(const Vec3& p, double bound, const Place& start) c
   }
   NearestSearch search(*this, p, bound, start, Feet::exact);
   const Foot foot = search.run();
-  kept->keep({asked, bound, start.known(), start.at, search.settled_at_start(), foot, search.is_settled(),
-              search.work(), search.last_pass()});
+  kept->keep({asked, bound, start.known(), start.at, search.from_start(), foot, search.is_settled(), search.work(),
+              search.last_pass()});
   return foot;
 }
 
