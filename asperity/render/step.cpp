@@ -39,7 +39,11 @@ ProxyCache::ProxyCache(const Scene& scene) {
   if (!(scene.probe_radius() > 0.0)) return;
   const auto any = [&](const auto& is) { return std::any_of(instances.begin(), instances.end(), is); };
   const bool reliefs = any([](const Instance& instance) { return relief_of(instance) != nullptr; });
-  const bool isosurfaces = any([](const Instance& instance) { return iso_of(instance.surface) != nullptr; });
+  // Of bricks, what is known changes as they are read.
+  const bool isosurfaces = any([](const Instance& instance) {
+    const IsoSurface* iso = iso_of(instance.surface);
+    return iso != nullptr && iso->field().bricks() == nullptr;
+  });
   // Any of them may come to be any instance's.
   for (std::size_t i = 0; i < std::min(instances.size(), entries_.size()); ++i) {
     if (reliefs) entries_[i].blocks = std::make_unique<ReliefBlocks>();

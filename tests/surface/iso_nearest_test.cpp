@@ -9,6 +9,11 @@
 namespace asperity::test::iso_nearest_test {
 namespace {
 
+/// So steep that it bulges within cells.
+IsoSurface rough_surface(std::uint32_t count, CellReconstruction reconstruction, std::uint64_t seed, double threshold) {
+  return IsoSurface::build(random_field(count, reconstruction, seed, 0.4), threshold, Inside::high).value();
+}
+
 class IsoNearest : public ::testing::TestWithParam<CellReconstruction> {};
 INSTANTIATE_TEST_SUITE_P(Both, IsoNearest,
                          ::testing::Values(CellReconstruction::trilinear, CellReconstruction::smooth));
@@ -19,8 +24,7 @@ TEST_P(IsoNearest, TheNearestPlaceIsAsNearAsWhatRaysMeet) {
   int seen = 0;
   int missed = 0;
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
-    const auto field = random_field(14, GetParam(), seed, 0.4);
-    const IsoSurface surface = IsoSurface::build(field, 0.35, Inside::high).value();
+    const IsoSurface surface = rough_surface(14, GetParam(), seed, 0.35);
     SurfaceCache cache;
     const IsoView view = surface.view(cache);
     std::mt19937_64 generator(seed + 100);
@@ -52,8 +56,7 @@ TEST_P(IsoNearest, WhatIsKeptChangesNeitherAnswersNorWhatTheyTake) {
   int found = 0;
   int again = 0;
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
-    const auto field = random_field(14, GetParam(), seed, 0.4);
-    const IsoSurface surface = IsoSurface::build(field, 0.3, Inside::high).value();
+    const IsoSurface surface = rough_surface(14, GetParam(), seed, 0.3);
     KeptCells kept;
     WorkMeter with;
     WorkMeter without;
@@ -95,8 +98,7 @@ TEST(IsoNearestExactly, TellsTheDirectionToRounding) {
   double most = 0.0;
   double most_as_walked = 0.0;
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
-    const auto field = random_field(12, CellReconstruction::smooth, seed, 0.4);
-    const IsoSurface surface = IsoSurface::build(field, 0.3, Inside::high).value();
+    const IsoSurface surface = rough_surface(12, CellReconstruction::smooth, seed, 0.3);
     SurfaceCache cache;
     const IsoView view = surface.view(cache);
     for (int i = 0; i < 200; ++i) {

@@ -65,6 +65,7 @@ Foot refined(const View& view, const Foot& foot, const Vec3& local) noexcept {
   return foot;
 }
 
+/// The nearest place, as exactly as the surface can tell it.
 template <SurfaceView View>
 Foot nearest_exactly(const View& view, const Vec3& p, double bound, const Place& start) noexcept {
   if constexpr (requires { view.nearest_exactly(p, bound, start); }) {

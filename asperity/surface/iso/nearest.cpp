@@ -117,16 +117,14 @@ class NearestSearch {
   static constexpr int most_passes = 16;
   static constexpr double finest_of_distance = 0.5;
 
-  [[nodiscard]] double distance_to(const std::uint32_t first[3], const std::uint32_t last[3]) const noexcept {
-    double squared = 0.0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double x = p_[static_cast<int>(a)];
-      const double low = axes_[a].node(first[a]);
-      const double high = axes_[a].node(std::min(last[a], axes_[a].cells()));
-      const double beyond = std::max({0.0, low - x, x - high});
-      squared += beyond * beyond;
-    }
-    return std::sqrt(squared);
+  /// How far p is along one axis from the cells first … last - 1, squared.
+  [[nodiscard]] double beyond(std::size_t axis, std::uint32_t first, std::uint32_t last) const noexcept {
+    const double x = p_[static_cast<int>(axis)];
+    const double off = std::max({0.0, axes_[axis].node(first) - x, x - axes_[axis].node(last)});
+    return off * off;
+  }
+  [[nodiscard]] double beyond(std::size_t axis, std::uint32_t cell) const noexcept {
+    return beyond(axis, cell, cell + 1);
   }
 
   void visit(const MinMaxOctree::Node& node) noexcept {
@@ -143,7 +141,9 @@ class NearestSearch {
       std::uint32_t first[3];
       std::uint32_t last[3];
       octree_.cells_of(children[i], first, last);
-      distance[i] = distance_to(first, last);
+      double squared = 0.0;
+      for (std::size_t a = 0; a < 3; ++a) squared += beyond(a, first[a], std::min(last[a], axes_[a].cells()));
+      distance[i] = std::sqrt(squared);
       int at = i;
       for (; at > 0 && distance[order[at - 1]] > distance[i]; --at) order[at] = order[at - 1];
       order[at] = i;
@@ -151,13 +151,6 @@ class NearestSearch {
     for (int i = 0; i < count; ++i) {
       if (distance[order[i]] < best_) visit(children[order[i]]);
     }
-  }
-
-  /// How far p is from a cell along one axis, squared.
-  [[nodiscard]] double beyond(std::size_t axis, std::uint32_t cell) const noexcept {
-    const double x = p_[static_cast<int>(axis)];
-    const double off = std::max({0.0, axes_[axis].node(cell) - x, x - axes_[axis].node(cell + 1)});
-    return off * off;
   }
 
   void visit_leaf(const MinMaxOctree::Node& node) noexcept {

@@ -74,8 +74,8 @@ struct IsoView {
   /// field has no slope.
   [[nodiscard]] SweptHit first_touch(const Segment& motion, Sides sides) const noexcept;
   /// Cells in order of distance, dismissed by bounds of the field over them and their parts; what is left leads
-  /// downhill by Newton's method. What bulges within an eighth of a cell and is nearer by less than that lets corners
-  /// tell may be missed.
+  /// downhill by Newton's method. Of several places within an eighth of a cell and half of the distance, all nearer
+  /// than what else there is, it may be another than the nearest.
   [[nodiscard]] Foot nearest(const Vec3& p, double bound, const Place& start = {}) const noexcept;
   /// The same to rounding where the foot lies within one cell, as balls need it: see refined(). What it took and found
   /// is kept, where there is room for it.
